@@ -1,0 +1,1 @@
+"""Body meshes: sequences, their location, their silhouettes, their surface."""

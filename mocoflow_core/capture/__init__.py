@@ -1,0 +1,1 @@
+"""Scenes on disk and clips in memory: frames, masks, background, cameras."""

@@ -1,0 +1,1 @@
+"""Rigid motion, cameras, rays, boxes and grids: the bottom layer."""
