@@ -1,0 +1,1 @@
+"""Cached stages, one a file: open inputs, call one core function, commit the output."""
