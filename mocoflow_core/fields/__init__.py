@@ -1,0 +1,1 @@
+"""What is learned: canonical fields and motion fields, and the encodings in front of them."""
