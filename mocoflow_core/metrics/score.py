@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import version
 
 import numpy as np
-import skimage
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -62,7 +62,7 @@ def protocol(configuration: EvaluationConfig, side: int, notes: Sequence[str] = 
         "PSNR of sRGB values; psnr, ssim over the crop, psnr_union over both masks, "
         "psnr_image over the whole image",
         f"SSIM: Gaussian window {WINDOW_PX} px, sigma {SIGMA_PX}, scikit-image "
-        f"{skimage.__version__}",
+        f"{version('scikit-image')}",
         *notes,
     ]
     return "; ".join(facts)
