@@ -1,0 +1,192 @@
+"""The artifact store: a folder of finished stages, named by the key of their content.
+
+``<store>/<stage>/<key>/`` appears by one rename, when its manifest and payloads are on the disk.
+Until then the stage works in ``<key>.partial/``, which outlives a killed process, so that a long
+stage resumes there from its checkpoints.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from pydantic import JsonValue
+
+from mocoflow_core.artifacts import Artifact
+from mocoflow_core.errors import InputError
+from mocoflow_core.io.manifest import (
+    Manifest,
+    describe_payloads,
+    flush_to_disk,
+    library_versions,
+)
+from mocoflow_core.io.work_clock import WorkClock
+
+Kind = TypeVar("Kind", bound=Artifact)
+
+
+class Store:
+    """Artifacts in a local folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.root = folder
+        self.url = str(folder)
+
+    def find(self, kind: type[Kind], key: str) -> Kind | None:
+        """The finished artifact; ``None`` where it is absent, incomplete or damaged.
+
+        Sizes and digests of all payloads are checked (digests once for an untouched file).
+        """
+        folder = self._folder(kind.stage, key)
+        manifest = Manifest.read(folder)
+        if manifest is None or manifest.key != key or not manifest.is_intact(folder):
+            return None
+        return reference_to(kind, manifest, cached=True)
+
+    def folder(self, artifact: Artifact) -> Path:
+        """The local folder with the payloads of an artifact that was found or just committed."""
+        return self._folder(artifact.stage, artifact.key)
+
+    @contextmanager
+    def computing(self, kind: type[Kind], key: str, *, resumes: bool) -> Iterator[Workspace[Kind]]:
+        """The sole right to compute one artifact; another process that wants it waits here.
+
+        The lock belongs to the process: the kernel drops it when the process dies. With
+        ``resumes`` the workspace of a killed try is kept. Raises ``InputError`` on a full disk.
+        """
+        folder = self._folder(kind.stage, key)
+        partial = folder.with_name(f"{key}.partial")
+        with _full_disk_is_bad_input(self.root), _locked(folder.with_name(f"{key}.lock")):
+            found = self.find(kind, key)
+            if found is None:
+                clear_folder(folder)
+                if not resumes:
+                    self._forget_try(partial)
+                partial.mkdir(parents=True, exist_ok=True)
+            yield Workspace(self, kind, key, partial, found)
+
+    def publish(self, partial: Path, manifest: Manifest) -> None:
+        """Make a finished workspace the artifact, in one step."""
+        manifest.write(partial)
+        flush_to_disk(partial)
+        folder = self._folder(manifest.stage, manifest.key)
+        partial.rename(folder)
+        _sync_folder(folder.parent)
+
+    def _forget_try(self, partial: Path) -> None:
+        clear_folder(partial)
+        WorkClock.of(partial).forget()
+
+    def _folder(self, stage: str, key: str) -> Path:
+        return self.root / stage / key
+
+
+class Workspace(Generic[Kind]):
+    """Where one stage writes its payloads; ``found`` holds the artifact if another made it."""
+
+    def __init__(
+        self, store: Store, kind: type[Kind], key: str, path: Path, found: Kind | None
+    ) -> None:
+        self.path = path
+        self.found = found
+        self._store = store
+        self._kind = kind
+        self._key = key
+        self._clock = WorkClock.of(path)
+
+    def note_time(self) -> None:
+        """Write down the seconds worked so far, so that a kill does not forget them."""
+        self._clock.note()
+
+    def commit(
+        self,
+        algorithm_version: int,
+        inputs: Mapping[str, str],
+        configuration: Mapping[str, JsonValue],
+        summary: Mapping[str, JsonValue],
+    ) -> Kind:
+        """Turn the workspace into the artifact."""
+        manifest = Manifest(
+            stage=self._kind.stage,
+            key=self._key,
+            algorithm_version=algorithm_version,
+            inputs=dict(inputs),
+            configuration=dict(configuration),
+            payloads=describe_payloads(self.path),
+            wall_s=self._clock.wall_s,
+            cpu_s=self._clock.cpu_s,
+            versions=library_versions(),
+            summary=dict(summary),
+        )
+        self._store.publish(self.path, manifest)
+        self._clock.forget()
+        return reference_to(self._kind, manifest, cached=False)
+
+
+def reference_to(kind: type[Kind], manifest: Manifest, *, cached: bool) -> Kind:
+    """The small reference that stages pass on instead of the manifest."""
+    return kind(
+        key=manifest.key,
+        wall_s=manifest.wall_s,
+        cpu_s=manifest.cpu_s,
+        cached=cached,
+        summary=manifest.summary,
+    )
+
+
+def clear_folder(folder: Path) -> None:
+    """Remove a folder; renamed first, so that a kill leaves no half of it under its name."""
+    if folder.exists():
+        rubbish = folder.with_name(f"{folder.name}.rubbish")
+        shutil.rmtree(rubbish, ignore_errors=True)
+        folder.rename(rubbish)
+        shutil.rmtree(rubbish)
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+@contextmanager
+def _full_disk_is_bad_input(root: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        if not _says_disk_full(error):
+            raise
+        raise InputError(
+            f"The artifact store {root} needs free space",
+            "a full disk",
+            "Free some or choose another folder with --store; finished stages are kept.",
+        ) from error
+
+
+def _says_disk_full(error: BaseException | None) -> bool:
+    """Libraries wrap the system's error: look along the chain, and at their words."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return True
+        if os.strerror(errno.ENOSPC) in str(error):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
