@@ -1,0 +1,166 @@
+"""From a mesh file to one checked sequence, in world metres wherever its location is known."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mocoflow_core.body.mesh_checks import (
+    require_finite,
+    require_frames,
+    require_metres,
+    require_shapes,
+)
+from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.capture.scene import MeshesDescription, Scene
+from mocoflow_core.errors import InputError
+
+FileCoordinates = Literal["world", "camera", "camera-root-centred"]
+
+
+@dataclass(frozen=True, eq=False)
+class IngestedMeshes:
+    """A mesh for every source frame of the train camera.
+
+    ``coordinates`` "world": world metres. "camera-root-centred": the train camera's axes, the
+    translation unknown in each frame. ``located`` false asks for a location search.
+    """
+
+    meshes: MeshSequence
+    coordinates: Literal["world", "camera-root-centred"]
+    located: bool
+    warnings: tuple[str, ...] = ()
+
+    def save(self, folder: Path) -> None:
+        """Write ``meshes.npz`` and ``ingested.json`` into an existing folder."""
+        self.meshes.save(folder / "meshes.npz")
+        values = {
+            "coordinates": self.coordinates,
+            "located": self.located,
+            "warnings": self.warnings,
+        }
+        (folder / "ingested.json").write_text(json.dumps(values, indent=1))
+
+    @classmethod
+    def load(cls, folder: Path) -> IngestedMeshes:
+        """Inverse of ``save``."""
+        values = json.loads((folder / "ingested.json").read_text())
+        meshes = MeshSequence.load(folder / "meshes.npz")
+        return cls(meshes, values["coordinates"], values["located"], tuple(values["warnings"]))
+
+
+def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> IngestedMeshes:
+    """Read, check and join the body meshes to the train camera's frames.
+
+    An override file may say its own ``coordinates`` and ``located``; what it does not say is taken
+    from the scene. Frames missing inside are interpolated when the gap is short, with a warning.
+
+    Raises InputError for a file that is no mesh sequence, non-finite vertices, another frame
+    count, another unit.
+    """
+    path = meshes_override or scene.meshes()
+    if path is None or not path.is_file():
+        raise InputError(
+            "a body mesh for each frame",
+            "none" if path is None else f"no file {path}",
+            "Name a mesh file in scene.json, or give one with --meshes.",
+        )
+    raw, description = _read(path, scene.description.meshes)
+    require_shapes(raw)
+    require_finite(raw)
+    require_metres(raw)
+    expected = scene.frames(scene.train_camera).indices
+    require_frames(raw, expected, scene.description.fps)
+    faces, face_warnings = _proper_faces(raw)
+    joined, gap_warnings = _joined(replace(raw, faces=faces), expected)
+    root_centred = description.coordinates == "camera-root-centred"
+    if description.coordinates == "camera":
+        world = scene.cameras[scene.train_camera].to_world(joined.vertices.astype(np.float64))
+        joined = replace(joined, vertices=world.astype(np.float32))
+    return IngestedMeshes(
+        joined,
+        "camera-root-centred" if root_centred else "world",
+        description.located and not root_centred,
+        face_warnings + gap_warnings,
+    )
+
+
+def _read(
+    path: Path, described: MeshesDescription | None
+) -> tuple[MeshSequence, MeshesDescription]:
+    """The arrays of a mesh file, ascending in time, and where they stand."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+        raise InputError(
+            f"{path.name} must be a NumPy .npz of plain arrays",
+            f"{error}".splitlines()[0][:80],
+            "Write it with numpy.savez.",
+        ) from error
+    missing = sorted({"vertices", "faces", "frame_indices"} - arrays.keys())
+    if missing:
+        raise InputError(
+            f"{path.name} must hold vertices, faces and frame_indices",
+            f"no {', '.join(missing)}",
+            "Write the mesh file again.",
+        )
+    order = np.argsort(arrays["frame_indices"], kind="stable")
+    same_length = len(arrays["vertices"]) == len(order)
+    regressor = arrays.get("keypoint_regressor")
+    meshes = MeshSequence(
+        arrays["frame_indices"].astype(np.int32)[order],
+        arrays["vertices"].astype(np.float32)[order if same_length else slice(None)],
+        arrays["faces"].astype(np.int32),
+        None if regressor is None else regressor.astype(np.float32),
+    )
+    return meshes, _description(path, arrays, described)
+
+
+def _description(
+    path: Path, arrays: dict[str, NDArray[np.generic]], described: MeshesDescription | None
+) -> MeshesDescription:
+    fallback = described or MeshesDescription(file=path.name, coordinates="camera", located=True)
+    coordinates = str(arrays.get("coordinates", fallback.coordinates))
+    if coordinates not in get_args(FileCoordinates):
+        raise InputError(
+            f"coordinates must be one of {', '.join(get_args(FileCoordinates))}",
+            f"{coordinates!r:.40}",
+            f"Correct them in {path.name}.",
+        )
+    located = bool(arrays.get("located", fallback.located))
+    return fallback.model_copy(update={"coordinates": coordinates, "located": located})
+
+
+def _proper_faces(meshes: MeshSequence) -> tuple[NDArray[np.int32], tuple[str, ...]]:
+    """The faces without those that name a vertex twice: they have neither area nor normal."""
+    faces = meshes.faces
+    proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    if proper.all():
+        return faces, ()
+    if not proper.any():
+        raise InputError("faces with three vertices each", "none", "Correct the faces.")
+    return faces[proper], (f"{(~proper).sum()} faces name a vertex twice and are left out",)
+
+
+def _joined(
+    meshes: MeshSequence, expected: NDArray[np.int32]
+) -> tuple[MeshSequence, tuple[str, ...]]:
+    """One mesh for each expected frame; missing ones lie on the line between their neighbours."""
+    given = meshes.frame_indices
+    missing = np.setdiff1d(expected, given)
+    if not len(missing):
+        return meshes, ()
+    after = np.searchsorted(given, expected).clip(1)
+    before = after - 1
+    share = (expected - given[before]) / (given[after] - given[before])
+    steps = meshes.vertices[after] - meshes.vertices[before]
+    vertices = meshes.vertices[before] + share[:, None, None].astype(np.float32) * steps
+    warning = f"{len(missing)} frames without a mesh, the first {missing[0]}, are interpolated"
+    return replace(meshes, frame_indices=expected, vertices=vertices), (warning,)

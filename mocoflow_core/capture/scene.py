@@ -1,0 +1,273 @@
+"""The native scene folder: its description, validated, and the files behind it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from mocoflow_core.capture.frame_source import (
+    FrameSource,
+    numbered_images,
+    open_frame_source,
+)
+from mocoflow_core.errors import InputError
+from mocoflow_core.geometry.camera import Camera
+
+UP_VECTORS = {
+    sign + axis: (1.0 if sign == "+" else -1.0) * np.eye(3)[row]
+    for row, axis in enumerate("xyz")
+    for sign in "+-"
+}
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class WorldDescription(_Part):
+    """Unit and direction of up of the world's axes."""
+
+    unit: Literal["m"]
+    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+class CameraDescription(_Part):
+    """Calibration of one camera and where its pictures lie; paths relative to the scene."""
+
+    width: int = Field(gt=0)
+    height: int = Field(gt=0)
+    K: list[list[float]]
+    distortion: list[float] = [0.0] * 5
+    R: list[list[float]]
+    t: list[float]
+    frames: str
+    masks: str | None = None
+    background: str | None = None
+
+
+class MeshesDescription(_Part):
+    """The body mesh estimate: file, axes, and whether its translation can be trusted."""
+
+    file: str
+    coordinates: Literal["world", "camera", "camera-root-centred"]
+    located: bool
+    source: str = ""
+
+
+class TruthDescription(_Part):
+    """Exact bodies or keypoints; the metrics alone read them."""
+
+    file: str
+
+
+class SceneDescription(_Part):
+    """The content of ``scene.json``."""
+
+    format: Literal["mocoflow-scene"]
+    version: Literal[1]
+    name: str
+    fps: float = Field(gt=0, allow_inf_nan=False)
+    world: WorldDescription
+    train_camera: str
+    cameras: dict[str, CameraDescription]
+    meshes: MeshesDescription | None = None
+    truth: TruthDescription | None = None
+    license: str = ""
+    attribution: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """An opened scene folder. Nothing but the description has been read."""
+
+    root: Path
+    description: SceneDescription
+    cameras: dict[str, Camera]  # at the size of the files, distortion included
+
+    @property
+    def train_camera(self) -> str:
+        return self.description.train_camera
+
+    @property
+    def evaluation_cameras(self) -> list[str]:
+        return sorted(name for name in self.cameras if name != self.train_camera)
+
+    @property
+    def up(self) -> NDArray[np.float64]:
+        """Unit vector (3,) of up in the world."""
+        return UP_VECTORS[self.description.world.up]
+
+    def frames(self, camera: str) -> FrameSource:
+        """The frames of a camera, by source number."""
+        where = self.root / self.description.cameras[camera].frames
+        return open_frame_source(where, f"frames of {camera}")
+
+    def masks(self, camera: str) -> dict[int, Path]:
+        """Mask files of a camera by source number; empty when the scene brings none."""
+        where = self.description.cameras[camera].masks
+        return numbered_images(self.root / where, f"masks of {camera}") if where else {}
+
+    def background(self, camera: str) -> Path | None:
+        """The background plate of a camera, if the scene brings one."""
+        where = self.description.cameras[camera].background
+        return self.root / where if where else None
+
+    def meshes(self) -> Path | None:
+        """The body mesh file, if the scene brings one."""
+        return self.root / self.description.meshes.file if self.description.meshes else None
+
+    def truth(self) -> Path | None:
+        """The truth file, for metrics alone."""
+        return self.root / self.description.truth.file if self.description.truth else None
+
+    def training_description(self) -> dict[str, Any]:
+        """What the training side knows of ``scene.json``: no other camera, no truth, no names."""
+        values = self.description.model_dump(
+            mode="json", include={"format", "version", "fps", "world", "train_camera", "meshes"}
+        )
+        camera = self.description.cameras[self.train_camera]
+        return {**values, "camera": camera.model_dump(mode="json")}
+
+    def evaluation_description(self) -> dict[str, Any]:
+        """The rest that scores depend on: the other cameras and the truth."""
+        cameras = self.description.cameras
+        return {
+            "cameras": {
+                name: cameras[name].model_dump(mode="json") for name in self.evaluation_cameras
+            },
+            "truth": self.description.truth.model_dump() if self.description.truth else None,
+        }
+
+    def source_files(self) -> list[Path]:
+        """Every file the training side reads, apart from ``scene.json``."""
+        meshes = self.meshes()
+        return self._camera_files(self.train_camera) + ([meshes] if meshes else [])
+
+    def evaluation_files(self) -> list[Path]:
+        """Every further file the metrics read: the other cameras' and the truth."""
+        files = [file for name in self.evaluation_cameras for file in self._camera_files(name)]
+        truth = self.truth()
+        return files + ([truth] if truth else [])
+
+    def _camera_files(self, camera: str) -> list[Path]:
+        background = self.background(camera)
+        masks = self.masks(camera)
+        files = [*self.frames(camera).files, *(masks[index] for index in sorted(masks))]
+        return files + ([background] if background else [])
+
+
+def open_scene(path: Path) -> Scene:
+    """Read and validate ``scene.json`` of a folder (or given itself).
+
+    Raises InputError for an unreadable description, a matrix that is no rotation, non-finite
+    values or impossible intrinsics, and for files that are named but not there.
+    """
+    file = path if path.name == "scene.json" else path / "scene.json"
+    if not file.is_file():
+        raise InputError(
+            "a scene folder with a scene.json", f"{path}", "Check the path of the scene."
+        )
+    description = _parse(file)
+    if description.train_camera not in description.cameras:
+        raise InputError(
+            "train_camera must be one of the scene's cameras",
+            f"{description.train_camera!r} among {', '.join(description.cameras)}",
+            "Correct train_camera in scene.json.",
+        )
+    cameras = {name: _camera(name, part) for name, part in description.cameras.items()}
+    scene = Scene(file.parent, description, cameras)
+    _require_files(scene)
+    return scene
+
+
+def _parse(file: Path) -> SceneDescription:
+    try:
+        return SceneDescription.model_validate(json.loads(file.read_text(encoding="utf-8")))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError("scene.json must be JSON", str(error), "Correct its syntax.") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(step) for step in first["loc"]) or "its root"
+        raise InputError(
+            f"scene.json must follow the scene format at {where}",
+            f"{first.get('input')!r:.80} ({first['msg']})",
+            "Compare it with the scene format in the README.",
+        ) from error
+
+
+def _camera(name: str, part: CameraDescription) -> Camera:
+    camera = Camera(
+        name=name,
+        width=part.width,
+        height=part.height,
+        K=_array(part.K, (3, 3), f"K of {name}"),
+        R=_array(part.R, (3, 3), f"R of {name}"),
+        t=_array(part.t, (3,), f"t of {name}"),
+        distortion=_array(part.distortion, (5,), f"distortion of {name}"),
+    )
+    _check_rotation(camera)
+    _check_intrinsics(camera)
+    return camera
+
+
+def _array(values: object, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except ValueError:
+        array = np.empty(0)
+    if array.shape != shape:
+        size = " x ".join(map(str, shape))
+        raise InputError(
+            f"{what} must have {size} numbers", f"{values!r:.60}", "Correct scene.json."
+        )
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} must be finite", f"{array.tolist()}", "Correct scene.json.")
+    return array
+
+
+# Calibrations are stored with four or more digits; a transposed or scaled matrix is far outside.
+ROTATION_TOLERANCE = 1e-3
+
+
+def _check_rotation(camera: Camera) -> None:
+    error = float(np.abs(camera.R @ camera.R.T - np.eye(3)).max())
+    determinant = float(np.linalg.det(camera.R))
+    if error > ROTATION_TOLERANCE or determinant < 0:
+        raise InputError(
+            f"R of {camera.name} must be a rotation (orthonormal, determinant +1)",
+            f"R R^T off by {error:.3g}, determinant {determinant:.3g}",
+            "Give the world-to-camera rotation in OpenCV axes, without scale or mirror.",
+        )
+
+
+def _check_intrinsics(camera: Camera) -> None:
+    K = camera.K
+    affine = np.allclose(K[2], [0, 0, 1]) and K[1, 0] == 0
+    if not (affine and K[0, 0] > 0 and K[1, 1] > 0):
+        raise InputError(
+            f"K of {camera.name} must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0",
+            f"{K.tolist()}",
+            "Correct K in scene.json.",
+        )
+
+
+def _require_files(scene: Scene) -> None:
+    """Named files must exist. Other cameras are checked too: a half scene is a user's mistake."""
+    for name, part in scene.description.cameras.items():
+        for what in ("frames", "masks", "background"):
+            _require(scene.root, getattr(part, what), f"{what} of {name}")
+    for what, given in (("meshes", scene.description.meshes), ("truth", scene.description.truth)):
+        _require(scene.root, given.file if given else None, what)
+
+
+def _require(root: Path, where: str | None, what: str) -> None:
+    if where is not None and not (root / where).exists():
+        raise InputError(
+            f"{what} must exist", f"nothing at {where}", "Add it or correct scene.json."
+        )

@@ -1,0 +1,76 @@
+"""From a picture as stored to the working size: lens distortion removed, area-averaged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mocoflow_core.geometry.camera import Camera
+
+# Pixel centres of the corner origin.
+_HALF_PIXEL = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class WorkingView:
+    """Brings pictures of ``source`` to the undistorted pinhole ``camera``.
+
+    Distortion is removed at full size first, then the picture shrinks by averaging the covered
+    area, which is exact for the corner origin of ``K``.
+    """
+
+    source: Camera
+    camera: Camera
+
+    @classmethod
+    def of(cls, source: Camera, max_side: int) -> WorkingView:
+        """The view whose longer side has at most ``max_side`` pixels; never enlarged."""
+        scale = min(1.0, max_side / max(source.width, source.height))
+        width, height = round(source.width * scale), round(source.height * scale)
+        return cls(source, source.undistorted().resized(max(width, 1), max(height, 1)))
+
+    def image(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """A picture (H, W, 3) or a mask (H, W) of 0 to 255 at the working size."""
+        if self._maps is not None:
+            picture = cv2.remap(picture, *self._maps, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
+        if picture.shape[:2] == (self.camera.height, self.camera.width):
+            return np.ascontiguousarray(picture)
+        size = (self.camera.width, self.camera.height)
+        return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+
+    def mask(self, picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """A mask (H, W) of 0 to 255 at the working size: true where most of the area is."""
+        binary = np.where(picture > 127, np.uint8(255), np.uint8(0))
+        return self.image(binary) > 127
+
+    @cached_property
+    def _maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]] | None:
+        """For each undistorted pixel its place in the stored picture; none without distortion."""
+        if self.source.is_pinhole:
+            return None
+        columns, rows = np.meshgrid(np.arange(self.source.width), np.arange(self.source.height))
+        pixels = np.stack([columns, rows], axis=-1) + _HALF_PIXEL
+        # cv2.remap has pixel centres at integers.
+        places = (distort(pixels, self.source) - _HALF_PIXEL).astype(np.float32)
+        return cv2.convertMaps(places, None, cv2.CV_16SC2)
+
+
+def distort(pixels: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+    """Where the lens moves ideal pinhole pixels (..., 2), corner origin.
+
+    OpenCV's model ``k1, k2, p1, p2, k3``; the skew of ``K`` is kept.
+    """
+    k1, k2, p1, p2, k3 = camera.distortion
+    homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
+    rays = homogeneous @ np.linalg.inv(camera.K).T
+    x, y = rays[..., 0], rays[..., 1]
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    bent_x = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    bent_y = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    bent = np.stack([bent_x, bent_y, np.ones_like(x)], axis=-1)
+    return (bent @ camera.K.T)[..., :2]
