@@ -1,0 +1,70 @@
+"""How far a stage is: a bar with the remaining time in a terminal, an artifact in Prefect."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from uuid import UUID
+
+from prefect.artifacts import create_progress_artifact, update_progress_artifact
+from prefect.context import TaskRunContext
+from rich.console import Console
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+
+Progress = Callable[[float, str], None]
+
+# Each update is an event that Prefect keeps for days.
+SECONDS_BETWEEN_UPDATES = 5.0
+
+
+@contextmanager
+def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Progress]:
+    """A callback (fraction in [0, 1], short text) for the body of a stage.
+
+    ``note_time`` is called now and then, so that a killed stage knows what it has cost.
+    """
+    artifact = ProgressArtifact(stage) if TaskRunContext.get() else None
+    with Bar(
+        TextColumn("{task.description:<18}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[text]}"),
+        console=Console(stderr=True),
+        disable=not sys.stderr.isatty(),
+    ) as bar:
+        row = bar.add_task(stage, total=1.0, text="")
+        updated = time.monotonic()
+
+        def report(fraction: float, text: str) -> None:
+            nonlocal updated
+            bar.update(row, completed=fraction, text=text)
+            if time.monotonic() - updated >= SECONDS_BETWEEN_UPDATES:
+                updated = time.monotonic()
+                note_time()
+                if artifact:
+                    artifact.update(fraction, text)
+
+        yield report
+        bar.update(row, completed=1.0, text="")
+
+
+class ProgressArtifact:
+    """A progress artifact that appears with its first update: short stages leave none."""
+
+    def __init__(self, stage: str) -> None:
+        self._stage = stage
+        self._id: UUID | None = None
+
+    def update(self, fraction: float, text: str) -> None:
+        percent = 100.0 * min(max(fraction, 0.0), 1.0)
+        description = f"{self._stage}: {text}"
+        if self._id is None:
+            key = self._stage.replace("_", "-")
+            created = create_progress_artifact(percent, key=key, description=description)
+            self._id = created if isinstance(created, UUID) else None
+        else:
+            update_progress_artifact(self._id, percent, description=description)
