@@ -33,9 +33,7 @@ def silhouette(
     return cover(pixels, visible, camera.width, camera.height)
 
 
-def cover(
-    pixels: NDArray[np.float64], faces: NDArray[np.int32], width: int, height: int
-) -> Mask:
+def cover(pixels: NDArray[np.float64], faces: NDArray[np.int32], width: int, height: int) -> Mask:
     """Pixels (height, width) whose centres lie in a triangle of ``pixels`` (V, 2), corner origin.
 
     Every pixel of every triangle's box is tested against the three edges, all at once.

@@ -54,7 +54,7 @@ def extract_clip(scene: Scene, configuration: CaptureConfig) -> Clip:
     neither masks nor a background plate.
     """
     selection = select_training_frames(scene, configuration)
-    return _extract(scene, scene.train_camera, selection, configuration)
+    return extract_camera(scene, scene.train_camera, selection, configuration)
 
 
 def extract_evaluation(
@@ -70,7 +70,7 @@ def extract_evaluation(
         scored = np.intersect1d(np.intersect1d(frame_indices, masked), scene.frames(name).indices)
         if len(scored):
             selection = FrameSelection(scored[:0], scored, scene.description.fps)
-            clips.append(_extract(scene, name, selection, configuration))
+            clips.append(extract_camera(scene, name, selection, configuration))
     return clips
 
 
@@ -104,9 +104,10 @@ def select_training_frames(scene: Scene, configuration: CaptureConfig) -> FrameS
     return selection
 
 
-def _extract(
+def extract_camera(
     scene: Scene, name: str, selection: FrameSelection, configuration: CaptureConfig
 ) -> Clip:
+    """The selected frames of any camera, with their masks and what is behind the person."""
     indices = selection.all
     view = WorkingView.of(scene.cameras[name], configuration.max_side)
     frames = _frames(scene, name, indices, view)

@@ -1,0 +1,59 @@
+"""Findings about a capture that a user should see, each with its measured value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mocoflow_core.capture.background_motion import background_motion_px
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.geometry.camera import Camera
+
+# dataset-formats: outside these a mask is inverted, empty, or of something else.
+FOREGROUND_SHARE = (0.01, 0.6)
+# The method assumes a camera that stands still.
+LARGEST_BACKGROUND_MOTION_PX = 0.5
+
+
+@dataclass(frozen=True)
+class CaptureFindings:
+    """What was measured on a few frames."""
+
+    foreground_share: float  # median over frames
+    empty_masks: int
+    background_motion_px: float  # of source pixels; nan where nothing could be seen
+    warnings: tuple[str, ...]
+
+
+def check_capture(clip: Clip, source: Camera) -> CaptureFindings:
+    """Masks of a usual size, a camera that stands still, a principal point inside the image."""
+    shares = clip.masks.mean(axis=(1, 2))
+    share = float(np.median(shares))
+    motion_px = background_motion_px(clip.frames, clip.masks) * source.width / clip.camera.width
+    empty = int((shares == 0).sum())
+    warnings = _principal_point(source)
+    if not FOREGROUND_SHARE[0] <= share <= FOREGROUND_SHARE[1]:
+        warnings.append(
+            f"masks cover {100 * share:.2g} % of the image "
+            f"(usual: {100 * FOREGROUND_SHARE[0]:g} to {100 * FOREGROUND_SHARE[1]:g} %): "
+            "inverted, empty, or a person far away?"
+        )
+    if empty:
+        warnings.append(f"{empty} of {len(shares)} looked-at masks are empty")
+    if motion_px > LARGEST_BACKGROUND_MOTION_PX:
+        warnings.append(
+            f"the background moves by {motion_px:.2f} px "
+            f"(limit {LARGEST_BACKGROUND_MOTION_PX} px): does the camera stand still?"
+        )
+    return CaptureFindings(share, empty, motion_px, tuple(warnings))
+
+
+def _principal_point(camera: Camera) -> list[str]:
+    cx, cy = camera.K[0, 2], camera.K[1, 2]
+    if 0 <= cx <= camera.width and 0 <= cy <= camera.height:
+        return []
+    return [
+        f"the principal point ({cx:.0f}, {cy:.0f}) of {camera.name} lies outside its "
+        f"{camera.width} x {camera.height} image: swapped sizes, or K of another resolution?"
+    ]
