@@ -7,7 +7,6 @@ stage resumes there from its checkpoints.
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import os
 import shutil
@@ -19,7 +18,7 @@ from typing import Generic, TypeVar
 from pydantic import JsonValue
 
 from mocoflow_core.artifacts import Artifact
-from mocoflow_core.errors import InputError
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.io.manifest import (
     Manifest,
     describe_payloads,
@@ -62,7 +61,10 @@ class Store:
         """
         folder = self._folder(kind.stage, key)
         partial = folder.with_name(f"{key}.partial")
-        with _full_disk_is_bad_input(self.root), _locked(folder.with_name(f"{key}.lock")):
+        with (
+            full_disk_is_bad_input(f"The artifact store {self.root}"),
+            _locked(folder.with_name(f"{key}.lock")),
+        ):
             found = self.find(kind, key)
             if found is None:
                 clear_folder(folder)
@@ -155,33 +157,6 @@ def _locked(path: Path) -> Iterator[None]:
     with path.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
-
-
-@contextmanager
-def _full_disk_is_bad_input(root: Path) -> Iterator[None]:
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        if not _says_disk_full(error):
-            raise
-        raise InputError(
-            f"The artifact store {root} needs free space",
-            "a full disk",
-            "Free some or choose another folder with --store; finished stages are kept.",
-        ) from error
-
-
-def _says_disk_full(error: BaseException | None) -> bool:
-    """Libraries wrap the system's error: look along the chain, and at their words."""
-    while error is not None:
-        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            return True
-        if os.strerror(errno.ENOSPC) in str(error):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
 
 
 def _sync_folder(folder: Path) -> None:
