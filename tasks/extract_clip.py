@@ -1,0 +1,29 @@
+"""Stage extract_clip: what the train camera saw, at the working size and rate."""
+
+from __future__ import annotations
+
+from mocoflow_core.artifacts import ClipArtifact
+from mocoflow_core.capture import extract
+from mocoflow_core.capture.extract import CaptureConfig
+from mocoflow_core.capture.scene import open_scene
+from tasks.source import Source
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(ClipArtifact, ALGORITHM_VERSION)
+def extract_clip(work: Stage, recording: Source, capture: CaptureConfig) -> Summary:
+    """Frames, masks, background and camera of the train side (MoCo-Flow sec. 4, data).
+
+    Output: ``clip.json`` and an ``.npy`` file for each array of the clip. A few seconds.
+    """
+    clip = extract.extract_clip(open_scene(recording.path), capture)
+    clip.save(work.folder)
+    return {
+        "frames": len(clip.frame_indices),
+        "held_out": int(clip.held_out.sum()),
+        "width": clip.camera.width,
+        "height": clip.camera.height,
+        "fps": clip.fps,
+    }

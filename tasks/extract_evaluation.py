@@ -1,0 +1,38 @@
+"""Stage extract_evaluation: what the other cameras saw, and the truth. For the metrics alone."""
+
+from __future__ import annotations
+
+import shutil
+
+from mocoflow_core.artifacts import ClipArtifact, EvaluationArtifact
+from mocoflow_core.capture import extract
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.capture.extract import CaptureConfig
+from mocoflow_core.capture.scene import open_scene
+from tasks.source import Source
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(EvaluationArtifact, ALGORITHM_VERSION)
+def extract_evaluation(
+    work: Stage, recording: Source, clip: ClipArtifact, capture: CaptureConfig
+) -> Summary:
+    """The clip's frames as the other cameras saw them, where they have a mask to score against.
+
+    Output: a folder ``<camera>/`` with a clip for each camera, and ``truth.npz`` if the scene
+    brings one. A few seconds.
+    """
+    scene = open_scene(recording.path)
+    frame_indices = Clip.load(work.open(clip)).frame_indices
+    clips = extract.extract_evaluation(scene, frame_indices, capture)
+    for seen in clips:
+        (work.folder / seen.camera.name).mkdir()
+        seen.save(work.folder / seen.camera.name)
+    if truth := scene.truth():
+        shutil.copyfile(truth, work.folder / "truth.npz")
+    return {
+        "cameras": {seen.camera.name: len(seen.frame_indices) for seen in clips},
+        "truth": truth is not None,
+    }

@@ -1,0 +1,30 @@
+"""Stage inspect_scene: a cheap look at what the scene brings."""
+
+from __future__ import annotations
+
+from mocoflow_core.artifacts import InspectionArtifact, MeshArtifact
+from mocoflow_core.body.ingest import IngestedMeshes
+from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.planning import inspection
+from mocoflow_core.planning.plan import PlanConfig, decide_location
+from tasks.source import Source
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(InspectionArtifact, ALGORITHM_VERSION)
+def inspect_scene(
+    work: Stage, recording: Source, meshes: MeshArtifact, plan: PlanConfig
+) -> Summary:
+    """Measures the train side on a few frames; its summary says which preparation is needed.
+
+    Output: ``inspection.json``. A second or two.
+    """
+    ingested = IngestedMeshes.load(work.open(meshes))
+    found = inspection.inspect_scene(open_scene(recording.path), ingested)
+    (work.folder / "inspection.json").write_text(found.model_dump_json(indent=1))
+    return {
+        "location_search": decide_location(found, plan).needed,
+        "warnings": list(found.warnings),
+    }
