@@ -9,9 +9,9 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import wraps
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from prefect import Task
 from prefect.cache_policies import CachePolicy
@@ -28,7 +28,6 @@ Inputs = ParamSpec("Inputs")
 Kind = TypeVar("Kind", bound=Artifact)
 Summary = Mapping[str, JsonValue]
 Body = Callable[Concatenate["Stage", Inputs], Summary]
-Staged = Callable[Concatenate[Store, Inputs], Kind]
 
 
 @dataclass(frozen=True)
@@ -44,51 +43,58 @@ class Stage:
         return self.store.folder(artifact)
 
 
-def stage(
-    kind: type[Kind], version: int, *, resumes: bool = False
-) -> Callable[[Body[Inputs]], Staged[Inputs, Kind]]:
-    """Turn a body that fills a folder into a task that is called with the store.
+@dataclass(frozen=True, eq=False)
+class CachedStage(Generic[Inputs, Kind]):
+    """A body that fills a folder, called with the store that the folder belongs to.
 
     Every argument counts in the key: artifacts and sources by content, the rest by value. With
     ``resumes`` the folder of a killed try is handed to the next one.
     """
 
-    def decorate(body: Body[Inputs]) -> Staged[Inputs, Kind]:
-        def run(store: Store, arguments: dict[str, Any]) -> Kind:
-            parts = _by_content(arguments)
-            with store.computing(
-                kind, key_of(kind.stage, version, *parts), resumes=resumes
-            ) as work:
-                if work.found:
-                    return work.found
-                with showing_progress(kind.stage, work.note_time) as progress:
-                    summary = body(Stage(work.path, progress, store), **arguments)
-                return work.commit(version, *parts, summary)
+    kind: type[Kind]
+    version: int
+    resumes: bool
+    body: Body[Inputs]
 
-        policy = CachePolicy.from_cache_key_fn(
-            lambda _, given: key_of(kind.stage, version, *_by_content(given["arguments"]))
-        )
-        task = Task(
-            run,
-            name=kind.stage,
-            task_run_name=kind.stage,
-            description=inspect.getdoc(body),
-            cache_policy=policy,
+    def __call__(self, store: Store, *args: Inputs.args, **kwargs: Inputs.kwargs) -> Kind:
+        _, *names = inspect.signature(self.body).parameters
+        arguments = dict(zip(names, args, strict=False)) | kwargs
+        found = store.find(self.kind, self._key(arguments))
+        computed = self.task.with_options(refresh_cache=found is None)(store, arguments)
+        return found or computed
+
+    @cached_property
+    def task(self) -> Task[..., Kind]:
+        """The stage as Prefect sees it."""
+        return Task(
+            self._run,
+            name=self.kind.stage,
+            task_run_name=self.kind.stage,
+            description=inspect.getdoc(self.body),
+            cache_policy=CachePolicy.from_cache_key_fn(
+                lambda _, given: self._key(given["arguments"])
+            ),
             persist_result=True,
             result_serializer="json",
         )
 
-        @wraps(body)
-        def call(store: Store, *args: Inputs.args, **kwargs: Inputs.kwargs) -> Kind:
-            _, *names = inspect.signature(body).parameters
-            arguments = dict(zip(names, args, strict=False)) | kwargs
-            found = store.find(kind, key_of(kind.stage, version, *_by_content(arguments)))
-            outcome = task.with_options(refresh_cache=found is None)(store, arguments)
-            return found or outcome
+    def _run(self, store: Store, arguments: dict[str, Any]) -> Kind:
+        with store.computing(self.kind, self._key(arguments), resumes=self.resumes) as work:
+            if work.found:
+                return work.found
+            with showing_progress(self.kind.stage, work.note_time) as progress:
+                summary = self.body(Stage(work.path, progress, store), **arguments)  # type: ignore
+            return work.commit(self.version, *_by_content(arguments), summary)
 
-        return call
+    def _key(self, arguments: Mapping[str, Any]) -> str:
+        return key_of(self.kind.stage, self.version, *_by_content(arguments))
 
-    return decorate
+
+def stage(
+    kind: type[Kind], version: int, *, resumes: bool = False
+) -> Callable[[Body[Inputs]], CachedStage[Inputs, Kind]]:
+    """Decorate the body of a stage."""
+    return lambda body: CachedStage(kind, version, resumes, body)
 
 
 def _by_content(arguments: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, JsonValue]]:
