@@ -42,7 +42,8 @@ def _median_shift(
             patch = np.s_[top : top + side, left : left + side]
             if covered[patch].any() or first[patch].std() < LEAST_TEXTURE:
                 continue
-            shift, _ = cv2.phaseCorrelate(first[patch], second[patch], window)
+            # OpenCV writes the window into what it is given, hence the copies.
+            shift, _ = cv2.phaseCorrelate(first[patch].copy(), second[patch].copy(), window)
             shifts.append(shift)
     if not shifts:
         return float("nan")
