@@ -1,0 +1,122 @@
+"""Rendered views against their photographs, as rows of the table of scores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mocoflow_core.methods.rendered_views import Progress, Renderer, ScoredView, read_view
+from mocoflow_core.metrics.crop import crop_around, crop_side
+from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.score import EvaluationConfig, protocol, score_view
+from mocoflow_core.metrics.table import ScoreRow
+from mocoflow_core.metrics.views import draw_views
+
+
+class Subject(NamedTuple):
+    """Whose scores these are."""
+
+    scene: str
+    seed: int
+
+
+class Moment(NamedTuple):
+    """A state of the optimisation that was kept, and its training clock."""
+
+    step: int
+    wall_s: float
+    cpu_s: float
+    renderer: Renderer
+
+
+def score_views(
+    subject: Subject,
+    method: str,
+    views: Sequence[ScoredView],
+    folder: Path,
+    configuration: EvaluationConfig,
+) -> list[ScoreRow]:
+    """Scores of one method's pictures; the crop is the same for all methods."""
+    side = side_of(views, configuration)
+    rows = []
+    for view in views:
+        rgb, opacity = read_view(folder, view)
+        scores = _score(view, rgb, opacity, side, configuration)
+        rows += [
+            ScoreRow(
+                subject.scene,
+                method,
+                subject.seed,
+                view.camera.name,
+                view.frame_index,
+                metric,
+                value,
+                protocol(configuration, side),
+            )
+            for metric, value in scores.items()
+        ]
+    return rows
+
+
+def error_curve(
+    subject: Subject,
+    moments: Sequence[Moment],
+    views: Sequence[ScoredView],
+    configuration: EvaluationConfig,
+    progress: Progress,
+) -> list[CurveRow]:
+    """Mean scores over a small seeded draw of the views, at each kept moment."""
+    if not views:
+        return []
+    side = side_of(views, configuration)
+    named = {(view.camera.name, view.frame_index): view for view in views}
+    drawn = [
+        named[name]
+        for name in draw_views(list(named), configuration.curve_views, configuration.seed)
+    ]
+    rows = []
+    for number, moment in enumerate(moments):
+        scores = [
+            _score(
+                view, *moment.renderer.render(view.camera, view.frame_index), side, configuration
+            )
+            for view in drawn
+        ]
+        for metric in scores[0]:
+            value = float(np.mean([score[metric] for score in scores]))
+            rows.append(
+                CurveRow(
+                    subject.scene,
+                    "mocoflow",
+                    subject.seed,
+                    "optimise_scene",
+                    moment.step,
+                    moment.wall_s,
+                    moment.cpu_s,
+                    metric,
+                    value,
+                )
+            )
+        progress((number + 1) / len(moments), f"error at step {moment.step}")
+    return rows
+
+
+def side_of(views: Sequence[ScoredView], configuration: EvaluationConfig) -> int:
+    """Side of the crop that all scored views of a scene share."""
+    masks = (view.clip.masks[view.row] for view in views)
+    return crop_side(masks, configuration.crop_share, configuration.crop_box_margin)
+
+
+def _score(
+    view: ScoredView,
+    rgb: np.ndarray,
+    opacity: np.ndarray,
+    side: int,
+    configuration: EvaluationConfig,
+) -> dict[str, float]:
+    mask = np.asarray(view.clip.masks[view.row])
+    photograph = np.asarray(view.clip.frames[view.row])
+    return score_view(rgb, opacity, photograph, mask, crop_around(mask, side), configuration)
