@@ -10,6 +10,7 @@ from mocoflow_core.geometry.camera import Camera
 Mask = NDArray[np.bool_]
 # A triangle nearer than this is not drawn: its projection is meaningless.
 NEAR_M = 0.05
+SEAM_PX = 1e-9
 
 
 def silhouettes(
@@ -36,39 +37,46 @@ def silhouette(
 def cover(pixels: NDArray[np.float64], faces: NDArray[np.int32], width: int, height: int) -> Mask:
     """Pixels (height, width) whose centres lie in a triangle of ``pixels`` (V, 2), corner origin.
 
-    Every pixel of every triangle's box is tested against the three edges, all at once.
+    Each triangle covers one span in each row it meets; starts and ends of all spans are counted
+    and summed along the rows.
     """
-    covered = np.zeros((height, width), bool)
     corners = pixels[faces]
-    # Pixel centres lie at +0.5, so the box holds the centres between its sides.
-    low = np.ceil(corners.min(axis=1) - 0.5).clip(0).astype(np.int64)
-    high = np.floor(corners.max(axis=1) - 0.5).clip(max=(width - 1, height - 1)).astype(np.int64)
-    extent = high - low + 1
-    drawn = np.flatnonzero((extent > 0).all(axis=1))
-    corners, low, extent = corners[drawn], low[drawn], extent[drawn]
-    count = extent[:, 0] * extent[:, 1]
-    triangle = np.repeat(np.arange(len(drawn)), count)
-    within = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
-    columns = low[triangle, 0] + within % extent[triangle, 0]
-    rows = low[triangle, 1] + within // extent[triangle, 0]
-    inside = _inside(corners, triangle, columns + 0.5, rows + 0.5)
-    covered[rows[inside], columns[inside]] = True
-    return covered
+    # Pixel centres lie at +0.5, so rows from ceil to floor have their centres in the triangle.
+    top = np.ceil(corners[..., 1].min(axis=1) - 0.5).clip(0, height).astype(np.int64)
+    bottom = np.floor(corners[..., 1].max(axis=1) - 0.5).clip(-1, height - 1).astype(np.int64)
+    count = (bottom - top + 1).clip(0)
+    triangle = np.repeat(np.arange(len(faces)), count)
+    row = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count - top, count)
+    left, right = _span(corners, triangle, row + 0.5)
+    start = np.ceil(left - 0.5).clip(0, width).astype(np.int64)
+    end = np.floor(right - 0.5).clip(-1, width - 1).astype(np.int64) + 1
+    seen = start < end
+    size = height * (width + 1)
+    starts = np.bincount(row[seen] * (width + 1) + start[seen], minlength=size)
+    ends = np.bincount(row[seen] * (width + 1) + end[seen], minlength=size)
+    covering = np.cumsum((starts - ends).reshape(height, width + 1), axis=1)
+    return covering[:, :width] > 0
 
 
-def _inside(
-    corners: NDArray[np.float64],
-    triangle: NDArray[np.int64],
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    """Whether points lie on one side of all three edges of their triangle, whichever winding."""
+def _span(
+    corners: NDArray[np.float64], triangle: NDArray[np.int64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """From where to where each triangle reaches at height ``y``, whichever way it winds."""
     edges = np.roll(corners, -1, axis=1) - corners
-    # Sides are affine in the point: a x + b y + c, one coefficient per edge and triangle.
-    a, b = -edges[..., 1], edges[..., 0]
-    c = -(a * corners[..., 0] + b * corners[..., 1])
-    side = a[triangle] * x[:, None] + b[triangle] * y[:, None] + c[triangle]
-    return (side >= 0).all(axis=1) | (side <= 0).all(axis=1)
+    winding = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    turned = np.where(winding < 0, -1.0, 1.0)[:, None]
+    falling = turned * edges[..., 1]
+    slope = edges[..., 0] / np.where(edges[..., 1] == 0, np.inf, edges[..., 1])
+    crossing = corners[..., 0] - corners[..., 1] * slope
+    left, right = np.full(len(y), -np.inf), np.full(len(y), np.inf)
+    for edge in range(3):
+        x = crossing[triangle, edge] + slope[triangle, edge] * y
+        direction = falling[triangle, edge]
+        # With y down and this winding, edges that run up bound the left, those down the right.
+        np.maximum(left, x, out=left, where=direction < 0)
+        np.minimum(right, x, out=right, where=direction > 0)
+    # Neighbours share an edge up to rounding; no centre may fall between them.
+    return left - SEAM_PX, right + SEAM_PX
 
 
 def overlap(first: Mask, second: Mask) -> NDArray[np.float64]:
