@@ -18,12 +18,15 @@ def extract_clip(work: Stage, recording: Source, capture: CaptureConfig) -> Summ
 
     Output: ``clip.json`` and an ``.npy`` file for each array of the clip. A few seconds.
     """
-    clip = extract.extract_clip(open_scene(recording.path), capture)
+    scene = open_scene(recording.path)
+    clip = extract.extract_clip(scene, capture)
     clip.save(work.folder)
     return {
         "frames": len(clip.frame_indices),
         "held_out": int(clip.held_out.sum()),
-        "width": clip.camera.width,
-        "height": clip.camera.height,
+        "first_frame": int(clip.frame_indices[0]),
+        "last_frame": int(clip.frame_indices[-1]),
         "fps": clip.fps,
+        "up": scene.up.tolist(),
+        "camera": {"name": clip.camera.name, **clip.camera.to_json()},
     }

@@ -33,6 +33,6 @@ def extract_evaluation(
     if truth := scene.truth():
         shutil.copyfile(truth, work.folder / "truth.npz")
     return {
-        "cameras": {seen.camera.name: len(seen.frame_indices) for seen in clips},
+        "cameras": {seen.camera.name: seen.camera.to_json() for seen in clips},
         "truth": truth is not None,
     }

@@ -42,6 +42,10 @@ class Stage:
         """The folder with an input's payload files."""
         return self.store.folder(artifact)
 
+    def part(self, start: float, end: float) -> Progress:
+        """Progress of a part of the stage that spans these fractions of the whole."""
+        return lambda fraction, text: self.progress(start + fraction * (end - start), text)
+
 
 @dataclass(frozen=True, eq=False)
 class CachedStage(Generic[Inputs, Kind]):

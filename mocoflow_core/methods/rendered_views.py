@@ -76,6 +76,11 @@ class PosedMeshRenderer:
         return self._mesh.render(camera, self._vertices[frame_index])
 
 
+def load_clips(folder: Path) -> list[Clip]:
+    """The evaluation cameras' clips, a folder each, by name."""
+    return [Clip.load(path) for path in sorted(folder.iterdir()) if path.is_dir()]
+
+
 def scored_views(
     clip: Clip, evaluation: Sequence[Clip], configuration: EvaluationConfig
 ) -> list[ScoredView]:

@@ -1,0 +1,92 @@
+"""All scores of one run: pictures, motion, and the error over the training clock."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.fields.canonical_density import CanonicalDensity
+from mocoflow_core.methods.rendered_views import (
+    Progress,
+    TrainedRenderer,
+    load_clips,
+    scored_views,
+)
+from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, score_views
+from mocoflow_core.methods.truth_errors import TruthConfig, motion_rows
+from mocoflow_core.metrics.curve import write_curve
+from mocoflow_core.metrics.score import EvaluationConfig
+from mocoflow_core.metrics.table import mean_scores, write_scores
+from mocoflow_core.rendering.trained_scene import TrainedScene
+from mocoflow_core.training.clock import Seconds
+
+METHODS = ("mocoflow", "posed_mesh")
+MeanScores = dict[str, dict[str, dict[str, float]]]  # method, camera, metric
+
+
+@dataclass(frozen=True)
+class ScoringFolders:
+    """Where the pieces of a run lie."""
+
+    clip: Path
+    evaluation: Path
+    bodies: Path
+    trained: Path
+    views: Path
+
+
+def score_run(
+    subject: Subject,
+    folders: ScoringFolders,
+    before: Seconds,
+    evaluating: EvaluationConfig,
+    truth: TruthConfig,
+    into: Path,
+    progress: Progress,
+) -> MeanScores:
+    """Write ``scores.parquet`` and ``error_curve.parquet``; give the means over frames.
+
+    ``before`` is the training clock at the start of the optimisation.
+    """
+    clip = Clip.load(folders.clip)
+    views = scored_views(clip, load_clips(folders.evaluation), evaluating)
+    renderer = TrainedRenderer(TrainedScene.open(folders.trained), clip)
+    rows = [
+        row
+        for method in METHODS
+        for row in score_views(subject, method, views, folders.views / method, evaluating)
+    ]
+    truth_file = folders.evaluation / "truth.npz"
+    rows += motion_rows(
+        subject,
+        renderer,
+        clip,
+        MeshSequence.load(folders.bodies / "meshes.npz"),
+        CanonicalDensity.load(folders.trained).vertices,
+        truth_file if truth_file.exists() else None,
+        truth,
+    )
+    write_scores(rows, into / "scores.parquet")
+    moments = _kept_moments(folders.trained, renderer, clip, before)
+    curve = error_curve(subject, moments, views, evaluating, progress)
+    write_curve(curve, into / "error_curve.parquet")
+    return mean_scores(rows)
+
+
+def _kept_moments(
+    trained: Path, final: TrainedRenderer, clip: Clip, before: Seconds
+) -> list[Moment]:
+    """The states that the optimisation kept, in the order of its clock."""
+    snapshots = trained / "snapshots"
+    moments = []
+    for entry in json.loads((snapshots / "snapshots.json").read_text()):
+        weights = snapshots / f"{entry['step']:06d}.safetensors"
+        scene = TrainedScene.open(trained, weights)
+        scene.share_bodies(final.scene)
+        renderer = TrainedRenderer(scene, clip)
+        clock = before + Seconds(entry["wall_s"], entry["cpu_s"])
+        moments.append(Moment(entry["step"], clock.wall, clock.cpu, renderer))
+    return moments

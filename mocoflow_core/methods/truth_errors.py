@@ -1,0 +1,212 @@
+"""Did the optimisation repair the estimate? Distances to the truth, before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from pydantic import Field
+
+from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.fields.motion_hybrid import Moments
+from mocoflow_core.methods.rendered_views import TrainedRenderer
+from mocoflow_core.methods.scored_views import Subject
+from mocoflow_core.metrics.consensus import consensus_global_mm, consensus_local_mm
+from mocoflow_core.metrics.correspondence import correspondence_mm, draw_pairs
+from mocoflow_core.metrics.keypoints import (
+    KeypointErrors,
+    carried_keypoints,
+    keypoint_errors,
+    regress_keypoints,
+)
+from mocoflow_core.metrics.table import ScoreRow
+
+Points = NDArray[np.float64]
+
+
+class TruthConfig(ConfigurationPart):
+    """How many points and pairs of frames the distances are taken over."""
+
+    points: int = Field(400, ge=1, description="Surface points, evenly spread over the vertices.")
+    pairs_per_frame: int = Field(2, ge=1, description="Other frames each frame is reached from.")
+    seed: int = Field(0, ge=0, description="Draws the pairs.")
+
+
+@dataclass(frozen=True)
+class BodyOnlyMotion:
+    """The motion of the given mesh, spread into space: what there was before."""
+
+    renderer: TrainedRenderer
+
+    def to_canonical(self, points: Points, frame_index: int) -> Points:
+        moments = _moments(self.renderer, frame_index)
+        row = torch.zeros(len(points), dtype=torch.int64)
+        return _array(moments.body.to_canonical(_tensor(points), row).canonical)
+
+    def to_observed(self, points: Points, frame_index: int) -> Points:
+        moments = _moments(self.renderer, frame_index)
+        row = torch.zeros(len(points), dtype=torch.int64)
+        return _array(moments.body.to_observed(_tensor(points), row)[0])
+
+
+@dataclass(frozen=True)
+class LearnedMotion:
+    """The optimised motion: the body's, corrected by the residual."""
+
+    renderer: TrainedRenderer
+
+    def to_canonical(self, points: Points, frame_index: int) -> Points:
+        moments = _moments(self.renderer, frame_index)
+        row = torch.zeros(len(points), dtype=torch.int64)
+        motion = self.renderer.scene.field.motion
+        return _array(motion.to_canonical(_tensor(points), row, moments))
+
+    def to_observed(self, points: Points, frame_index: int) -> Points:
+        moments = _moments(self.renderer, frame_index)
+        row = torch.zeros(len(points), dtype=torch.int64)
+        motion = self.renderer.scene.field.motion
+        return _array(motion.to_observed(_tensor(points), row, moments)[0])
+
+
+Motion = BodyOnlyMotion | LearnedMotion
+
+
+def motion_rows(
+    subject: Subject,
+    renderer: TrainedRenderer,
+    clip: Clip,
+    meshes: MeshSequence,
+    canonical_vertices: NDArray[np.float32],
+    truth: Path | None,
+    configuration: TruthConfig,
+) -> list[ScoreRow]:
+    """Errors of the motion at the clip's frames, of the given body's (as ``posed_mesh``) and ours.
+
+    ``consensus_local_mm`` and ``consensus_global_mm`` need no truth; the distances to the truth
+    appear where it holds vertices or keypoints. All rows stand under the train camera's name.
+    """
+    given = meshes.at(clip.frame_indices)
+    learned = LearnedMotion(renderer)
+    canonical = canonical_vertices.astype(np.float64)
+    placed = np.stack([learned.to_observed(canonical, int(i)) for i in clip.frame_indices])
+    states = (
+        ("posed_mesh", BodyOnlyMotion(renderer), given.vertices.astype(np.float64)),
+        ("mocoflow", learned, placed),
+    )
+    rows = []
+    for method, motion, vertices in states:
+        measured = [*_consensus(motion, clip, given, configuration)]
+        if truth is not None:
+            measured += _against_truth(
+                motion, clip, vertices, given.keypoint_regressor, truth, configuration
+            )
+        rows += [
+            ScoreRow(
+                subject.scene,
+                method,
+                subject.seed,
+                clip.camera.name,
+                frame_index,
+                metric,
+                value,
+                _protocol(configuration),
+            )
+            for metric, frame_index, value in measured
+            if np.isfinite(value)
+        ]
+    return rows
+
+
+Measured = tuple[str, int, float]  # metric, frame_index, value
+
+
+def _consensus(
+    motion: Motion, clip: Clip, given: MeshSequence, configuration: TruthConfig
+) -> Iterator[Measured]:
+    """Over points on the given body, each frame with one drawn partner."""
+    partner = {end: start for start, end in draw_pairs(clip.frame_indices, 1, configuration.seed)}
+    for row, frame_index in enumerate(clip.frame_indices.tolist()):
+        points = _spread(given.vertices[row].astype(np.float64), configuration.points)
+        maps = (motion.to_canonical, motion.to_observed)
+        yield "consensus_local_mm", frame_index, consensus_local_mm(points, frame_index, *maps)
+        if frame_index in partner:
+            value = consensus_global_mm(points, frame_index, partner[frame_index], *maps)
+            yield "consensus_global_mm", frame_index, value
+
+
+def _against_truth(
+    motion: Motion,
+    clip: Clip,
+    vertices: Points,
+    regressor: NDArray[np.float32] | None,
+    truth: Path,
+    configuration: TruthConfig,
+) -> list[Measured]:
+    with np.load(truth, allow_pickle=False) as file:
+        arrays = {name: file[name] for name in file.files}
+    frames, known, ours = np.intersect1d(
+        arrays["frame_indices"], clip.frame_indices, return_indices=True
+    )
+    if not len(frames):
+        return []
+    measured: list[Measured] = []
+    pairs = draw_pairs(frames, configuration.pairs_per_frame, configuration.seed)
+    maps = (motion.to_canonical, motion.to_observed)
+    if "vertices" in arrays and pairs:
+        points = _spread(arrays["vertices"][known].astype(np.float64), configuration.points)
+        values = correspondence_mm(points, frames, pairs, *maps)
+        measured += [
+            ("correspondence_mm", end, float(value))
+            for (_, end), value in zip(pairs, values, strict=True)
+        ]
+    if "keypoints3d" in arrays:
+        keypoints = arrays["keypoints3d"][known].astype(np.float64)
+        if regressor is not None:
+            found = regress_keypoints(regressor, vertices[ours])
+            measured += _keypoints(keypoint_errors(found, keypoints, clip.camera), frames.tolist())
+        elif pairs:
+            carried, goal = carried_keypoints(keypoints, frames, pairs, *maps)
+            errors = keypoint_errors(carried, goal, clip.camera)
+            measured += _keypoints(errors, [end for _, end in pairs])
+    return measured
+
+
+def _keypoints(errors: KeypointErrors, frames: Sequence[int]) -> list[Measured]:
+    return [
+        (metric, int(frame), float(value))
+        for metric, values in errors._asdict().items()
+        for frame, value in zip(frames, values, strict=True)
+    ]
+
+
+def _spread(points: Points, count: int) -> Points:
+    """At most ``count`` of the points (..., N, 3), evenly spread over their order."""
+    total = points.shape[-2]
+    chosen = np.unique(np.linspace(0, total - 1, min(count, total)).round().astype(int))
+    return points[..., chosen, :]
+
+
+def _protocol(configuration: TruthConfig) -> str:
+    return (
+        f"distances in mm over {configuration.points} surface points, each frame reached from "
+        f"{configuration.pairs_per_frame} others; keypoints by the mesh's regressor, or carried "
+        "between frames where it has none"
+    )
+
+
+def _moments(renderer: TrainedRenderer, frame_index: int) -> Moments:
+    return renderer.scene.moments(renderer.time(frame_index))
+
+
+def _tensor(points: Points) -> torch.Tensor:
+    return torch.from_numpy(np.asarray(points, np.float32))
+
+
+def _array(points: torch.Tensor) -> Points:
+    return points.detach().numpy().astype(np.float64)

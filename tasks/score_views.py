@@ -1,0 +1,52 @@
+"""Stage score_views: the table of scores, the error curve, the distances to the truth."""
+
+from __future__ import annotations
+
+from mocoflow_core.artifacts import (
+    ClipArtifact,
+    EvaluationArtifact,
+    LocationArtifact,
+    MeshArtifact,
+    SceneArtifact,
+    ScoresArtifact,
+    ViewsArtifact,
+)
+from mocoflow_core.methods.scored_views import Subject
+from mocoflow_core.methods.scoring import ScoringFolders, score_run
+from mocoflow_core.methods.truth_errors import TruthConfig
+from mocoflow_core.metrics.score import EvaluationConfig
+from mocoflow_core.training.clock import Seconds
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(ScoresArtifact, ALGORITHM_VERSION)
+def score_views(
+    work: Stage,
+    scene: str,
+    seed: int,
+    views: ViewsArtifact,
+    trained: SceneArtifact,
+    clip: ClipArtifact,
+    evaluation: EvaluationArtifact,
+    bodies: MeshArtifact | LocationArtifact,
+    evaluating: EvaluationConfig,
+    truth: TruthConfig,
+) -> Summary:
+    """Scores as in the paper's sec. 4, for the trained scene and for the posed mesh.
+
+    Output: ``scores.parquet``, ``error_curve.parquet``. Seconds to minutes: the curve renders a
+    few views at each kept state.
+    """
+    folders = ScoringFolders(
+        clip=work.open(clip),
+        evaluation=work.open(evaluation),
+        bodies=work.open(bodies),
+        trained=work.open(trained),
+        views=work.open(views),
+    )
+    subject = Subject(scene, seed)
+    before = Seconds(trained.summary["before_wall_s"], trained.summary["before_cpu_s"])
+    means = score_run(subject, folders, before, evaluating, truth, work.folder, work.progress)
+    return {"mean": means}

@@ -1,0 +1,57 @@
+"""Stage write_report: one self-contained page about the run."""
+
+from __future__ import annotations
+
+import json
+
+from pydantic import JsonValue
+
+from mocoflow_core.artifacts import (
+    ClipArtifact,
+    EvaluationArtifact,
+    PlanArtifact,
+    ReportArtifact,
+    SceneArtifact,
+    ScoresArtifact,
+    ViewsArtifact,
+)
+from mocoflow_core.report.inputs import ReportInputs
+from mocoflow_core.report.page import write_report as write
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(ReportArtifact, ALGORITHM_VERSION)
+def write_report(
+    work: Stage,
+    run: dict[str, JsonValue],
+    clip: ClipArtifact,
+    evaluation: EvaluationArtifact,
+    plan: PlanArtifact,
+    trained: SceneArtifact,
+    views: ViewsArtifact,
+    scores: ScoresArtifact,
+) -> Summary:
+    """Input beside novel view, held-out views beside their photographs, scores, omissions, times.
+
+    Output: ``report.html``. A few seconds.
+    """
+    rendered = work.open(views)
+    inputs = ReportInputs(
+        run=run,
+        decisions=json.loads((work.open(plan) / "plan.json").read_text())["decisions"],
+        scores=work.open(scores) / "scores.parquet",
+        curve=work.open(scores) / "error_curve.parquet",
+        train_clip=work.open(clip),
+        evaluation=work.open(evaluation),
+        views=rendered / "mocoflow" / "views",
+        baseline_views=rendered / "posed_mesh" / "views",
+        novel_camera=str(views.summary["side_view"]),
+        novel_view=rendered / "side",
+        turntable=rendered / "turntable.mp4",
+        warnings=[str(warning) for warning in run["warnings"]],
+        guard_events=[str(event) for event in trained.summary["events"]],
+    )
+    write(inputs, work.folder / "report.html")
+    return {}
