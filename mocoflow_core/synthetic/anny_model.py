@@ -19,9 +19,8 @@ from anny.models.model_data import PHENOTYPE_VARIATIONS, ModelData, ModelMetadat
 from anny.models.phenotype import make_phenotype_anchors, phenotype_blendshape_weights
 from anny.paths import get_anny_root_dir
 from anny.utils.mesh_utils import triangulate_faces
-from pydantic import Field
 
-from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.synthetic.body_shape import BodyShape
 
 DTYPE = torch.float64
 
@@ -33,17 +32,6 @@ _TARGET_FILES = {
     "proportions": "macrodetails/proportions/{}.target.gz",
     "breast": "breast/{}.target.gz",
 }
-
-
-class BodyShape(ConfigurationPart):
-    """Anny's phenotype of an adult, each value in [0, 1]."""
-
-    gender: float = Field(0.0, ge=0, le=1, description="0 male, 1 female.")
-    age: float = Field(2 / 3, ge=2 / 3, le=1, description="2/3 a young adult, 1 an old one.")
-    muscle: float = Field(0.5, ge=0, le=1, description="0.5 is average.")
-    weight: float = Field(0.5, ge=0, le=1, description="0.5 is average.")
-    height: float = Field(0.5, ge=0, le=1, description="0.5 is average.")
-    proportions: float = Field(0.5, ge=0, le=1, description="0.5 is average.")
 
 
 def load_anny(shape: BodyShape) -> anny.Anny:

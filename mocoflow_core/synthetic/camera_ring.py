@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.synthetic.configuration import SyntheticConfig
+from mocoflow_core.synthetic.configuration import RecordingConfig
 
 _TARGET = np.array([0.0, 0.0, 0.92])  # About the middle of a standing person, metres.
 _HEIGHT, _HEIGHT_SPREAD = 1.25, 0.45  # Of the cameras above the floor, metres.
 _FILLED = 0.94  # Share of the image that the person's largest extent takes.
 
 
-def camera_ring(configuration: SyntheticConfig, vertices: NDArray[np.float64]) -> list[Camera]:
+def camera_ring(configuration: RecordingConfig, vertices: NDArray[np.float64]) -> list[Camera]:
     """Cameras whose common focal length just holds the person, vertices (T, V, 3), at all times.
 
     ``cam00`` stands in front (at -y); the others follow anticlockwise, at their own heights.
@@ -34,7 +34,7 @@ def look_at(centre: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray
     return np.stack([right, np.cross(forward, right), forward])
 
 
-def _camera(index: int, configuration: SyntheticConfig) -> Camera:
+def _camera(index: int, configuration: RecordingConfig) -> Camera:
     angle = -np.pi / 2 + 2 * np.pi * index / configuration.cameras
     height = _HEIGHT + _HEIGHT_SPREAD * np.sin(2.4 * index)
     centre = np.array(

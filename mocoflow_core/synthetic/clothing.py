@@ -85,7 +85,7 @@ class Outfit:
             chosen = np.flatnonzero(limbs == index)
             if len(chosen):
                 colours[chosen] = painters[limb](points[chosen])
-        fine = 0.16 * self._noise(points, 0.018) + 0.12 * self._noise(points + 0.31, 0.05)
+        fine = 0.22 * self._noise(points, 0.018) + 0.12 * self._noise(points + 0.31, 0.05)
         return colours * (1 + fine)[:, None]
 
     def _skin(self, points: Array) -> Array:
@@ -210,7 +210,9 @@ class Outfit:
         jeans = np.where(z > self._ankle_z + 0.04, 0.012 + 0.03 * (-z).clip(0, 0.9), 0)
         hair = np.where(z > self._eyes[2] + 0.06, 0.018, 0)
         parts = [(torso, shirt), (arms, sleeve), (legs, jeans), (head, hair)]
-        offset = sum(((2 * weight - 1).clip(0, 1) * part for weight, part in parts), np.zeros(len(z)))
+        offset = sum(
+            ((2 * weight - 1).clip(0, 1) * part for weight, part in parts), np.zeros(len(z))
+        )
         sway = np.sin(2 * np.pi * (6 * time + 3 * z + 2 * points[:, 0]))
         wrinkles = self._noise(points, 0.07)
         return offset * (1 + 0.25 * sway + 0.3 * wrinkles)

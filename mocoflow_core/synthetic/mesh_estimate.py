@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.synthetic.configuration import SyntheticConfig
 from mocoflow_core.synthetic.motions import Motion
 from mocoflow_core.synthetic.person import Person
@@ -32,9 +30,7 @@ NOISY_JOINTS = (
 _NOISE_SECONDS = 0.5  # Standard deviation of the smoothing: errors last about a second.
 
 
-def estimate_meshes(
-    configuration: SyntheticConfig, person: Person, motion: Motion
-) -> MeshSequence:
+def estimate_meshes(configuration: SyntheticConfig, person: Person, motion: Motion) -> MeshSequence:
     """The estimate in world metres; its root joint is where the person's is."""
     if configuration.mesh_estimate == "exact":
         topology = body_topology(person)
@@ -77,11 +73,3 @@ def _smooth_rotations(
     curve = gaussian_filter1d(random.standard_normal((count, 3)), smoothing, axis=0, mode="reflect")
     rms = np.sqrt((curve**2).sum(axis=1).mean())
     return Rotation.from_rotvec(curve * np.radians(rms_degrees) / rms)
-
-
-def root_centred(
-    meshes: MeshSequence, camera: Camera, root_position: NDArray[np.float64]
-) -> MeshSequence:
-    """The meshes in the camera's axes with the root joint (T, 3) at the origin of each frame."""
-    centred = (meshes.vertices - root_position[:, None]) @ camera.R.T
-    return replace(meshes, vertices=centred.astype(np.float32))

@@ -135,7 +135,8 @@ def dance(times: Times) -> Motion:
         "lowerleg01.L": _about("x", 45 * np.maximum(0, _wave(times, 4)), times),
         "lowerleg01.R": _about("x", 45 * np.maximum(0, _wave(times, 4, 0.5)), times),
         "spine04": _about("y", 9 * _wave(times, 2), times),
-        "spine02": _about("z", 14 * _wave(times, 3), times) * _about("x", 8 * _wave(times, 2), times),
+        "spine02": _about("z", 14 * _wave(times, 3), times)
+        * _about("x", 8 * _wave(times, 2), times),
         "neck02": _about("z", 14 * _wave(times, 3, 0.5), times),
         "head": _about("x", 8 * _wave(times, 4), times),
     }

@@ -11,7 +11,8 @@ from anny import Anny, KeypointsRegressor
 from anny.face_segmentation import get_face_segmentation_mask
 from numpy.typing import NDArray
 
-from mocoflow_core.synthetic.anny_model import BodyShape, load_anny
+from mocoflow_core.synthetic.anny_model import load_anny
+from mocoflow_core.synthetic.body_shape import BodyShape
 from mocoflow_core.synthetic.motions import Motion
 
 # The visible skin; cavities behind eyes and lips are no surface that a camera can see.
@@ -20,7 +21,18 @@ _OUTER_PARTS = [
 ]
 
 # Limb -> prefixes of the bones that move it; what matches none belongs to the torso.
-LIMBS = ("torso", "head", "arm.L", "arm.R", "hand.L", "hand.R", "leg.L", "leg.R", "foot.L", "foot.R")
+LIMBS = (
+    "torso",
+    "head",
+    "arm.L",
+    "arm.R",
+    "hand.L",
+    "hand.R",
+    "leg.L",
+    "leg.R",
+    "foot.L",
+    "foot.R",
+)
 _LIMB_PREFIXES = {
     "head": ("neck02", "neck03", "head", "eye"),
     "arm": ("shoulder01", "upperarm", "lowerarm"),

@@ -1,0 +1,51 @@
+"""The synthetic scenes that have names: a motion, or a motion with one difficulty."""
+
+from __future__ import annotations
+
+from mocoflow_core.errors import InputError
+from mocoflow_core.synthetic.configuration import SyntheticConfig
+
+_MOTIONS: dict[str, dict[str, object]] = {
+    "turn": {"motion": "turn"},
+    "walk": {"motion": "walk_circle"},
+    "dance": {"motion": "dance"},
+    "spin": {"motion": "fast_spin"},
+    "still": {"motion": "still"},
+}
+
+_DIFFICULTIES: dict[str, dict[str, object]] = {
+    "": {},
+    "_own_topology": {"mesh_estimate": "exact"},
+    "_noise6": {"mesh_estimate": "joint_noise", "joint_noise_deg": 6.0},
+    "_other_shape": {"mesh_estimate": "other_shape"},
+    "_rootless": {"located": False},
+    "_loose": {"clothing": "loose"},
+    "_shadows": {"shadows": "cast"},
+    "_hard": {
+        "mesh_estimate": "joint_noise",
+        "joint_noise_deg": 6.0,
+        "located": False,
+        "clothing": "loose",
+        "shadows": "cast",
+    },
+}
+
+SCENES: dict[str, SyntheticConfig] = {
+    motion + difficulty: SyntheticConfig.model_validate(
+        {"name": motion + difficulty} | _MOTIONS[motion] | _DIFFICULTIES[difficulty]
+    )
+    for motion in _MOTIONS
+    for difficulty in _DIFFICULTIES
+}
+
+
+def named_scene(name: str) -> SyntheticConfig:
+    """The configuration of a named scene. Raises InputError for an unknown name."""
+    if name not in SCENES:
+        raise InputError(
+            "A synthetic scene has a known name",
+            repr(name),
+            f"Choose a motion ({', '.join(_MOTIONS)}), alone or with one of "
+            f"{', '.join(filter(None, _DIFFICULTIES))}.",
+        )
+    return SCENES[name]
