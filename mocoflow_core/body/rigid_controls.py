@@ -7,10 +7,12 @@ frames is blended from them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from safetensors.numpy import load_file, save_file
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -19,6 +21,9 @@ Array = NDArray[np.float32]
 # Pulls rotations that a neighbourhood does not determine (flat, line-like or tiny ones) towards
 # the rotation of the whole body; relative to the neighbourhood's own extent, so free of units.
 _GLOBAL_PULL = 1e-3
+
+_FILE = "controls.safetensors"
+_PARTS = ("times", "canonical", "observed", "rotations", "surface", "surface_control")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +39,15 @@ class RigidControls:
     rotations: Array  # (T, K, 3, 3) canonical -> observed
     surface: Array  # (S, 3) dense points of the canonical surface
     surface_control: NDArray[np.int64]  # (S,) nearest control of each surface point
+
+    def frames(self, rows: NDArray[np.int64]) -> RigidControls:
+        """Only the given frames."""
+        return replace(
+            self,
+            times=self.times[rows],
+            observed=self.observed[rows],
+            rotations=self.rotations[rows],
+        )
 
     def surface_at(self, row: int) -> Array:
         """The dense surface points carried to one frame, (S, 3)."""
@@ -73,14 +87,18 @@ class RigidControls:
         return self._one_frame(clamped, observed, rotations)
 
     def _one_frame(self, time: float, observed: Array, rotations: Array) -> RigidControls:
-        return RigidControls(
-            np.array([time]),
-            self.canonical,
-            observed[None],
-            rotations[None],
-            self.surface,
-            self.surface_control,
+        return replace(
+            self, times=np.array([time]), observed=observed[None], rotations=rotations[None]
         )
+
+    def save(self, folder: Path) -> None:
+        """Write ``controls.safetensors``."""
+        parts = {name: np.ascontiguousarray(getattr(self, name)) for name in _PARTS}
+        save_file(parts, folder / _FILE)
+
+    @classmethod
+    def load(cls, folder: Path) -> RigidControls:
+        return cls(**load_file(folder / _FILE))  # type: ignore[arg-type]
 
 
 def rigid_controls(

@@ -7,6 +7,8 @@ is one trilinear look-up.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from torch import Tensor
 
 from mocoflow_core.body.rigid_controls import RigidControls
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
 from mocoflow_core.geometry.grid import SparseGrids
 
 Array = NDArray[np.float32]
@@ -34,6 +37,15 @@ class BodyMotionConfig(ConfigurationPart):
     )
 
 
+@dataclass(frozen=True, eq=False)
+class BodyLookup:
+    """What the body knows about P observed points."""
+
+    canonical: Tensor  # (P, 3)
+    distance: Tensor  # (P,) from the frame's mesh, metres, unsigned
+    facing: Tensor  # (P, 3) unit normal of the surface near the point, world space
+
+
 class BodyMotion:
     """Motion of the body mesh between canonical and observed space, world metres.
 
@@ -46,6 +58,7 @@ class BodyMotion:
         observed_grids: SparseGrids,
         observed_maps: Tensor,
         observed_distance: Tensor,
+        observed_facing: Tensor,
         canonical_grid: SparseGrids,
         canonical_maps: Tensor,
     ) -> None:
@@ -53,8 +66,10 @@ class BodyMotion:
         self.observed_grids = observed_grids  # one grid per frame
         self.observed_maps = observed_maps  # (N, 4, 3) to canonical
         self.observed_distance = observed_distance  # (N,) metres from the frame's mesh
+        self.observed_facing = observed_facing  # (N, 3) unit normals of the nearest surface
         self.canonical_grid = canonical_grid  # one grid
         self.canonical_maps = canonical_maps  # (T, M, 4, 3) to observed
+        self._near: dict[float, Tensor] = {}
 
     def to(self, device: torch.device) -> BodyMotion:
         return BodyMotion(
@@ -62,27 +77,48 @@ class BodyMotion:
             self.observed_grids.to(device),
             self.observed_maps.to(device),
             self.observed_distance.to(device),
+            self.observed_facing.to(device),
             self.canonical_grid.to(device),
             self.canonical_maps.to(device),
         )
 
-    def near_body(self, points: Tensor, frame: Tensor) -> Tensor:
-        """Whether the lattice knows anything about observed points (P, 3) of frame rows (P,)."""
-        return self.observed_grids.has_node(points, frame)
+    def near_body(self, points: Tensor, frame: Tensor, within_m: float) -> Tensor:
+        """Cheap test of observed points (P, 3) of frame rows (P,): may they lie near the mesh?
 
-    def to_canonical(self, points: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
-        """Observed points to canonical space.
-
-        Returns:
-            mapped points (P, 3) and their distance from the frame's mesh (P,); infinite, and the
-            point unmoved, where no node is near.
+        True for every point closer than ``within_m``, and for few that are farther.
         """
+        return self._may_be_near(within_m)[self.observed_grids.flat_nearest(points, frame)]
+
+    def _may_be_near(self, within_m: float) -> Tensor:
+        """For each lattice point of all frames: may a point next to it be ``within_m`` near?"""
+        if within_m not in self._near:
+            half_cell = 0.5 * 3.0**0.5 * self.observed_grids.spacing
+            numbers = self.observed_grids.node_map
+            distance = self.observed_distance[numbers.clamp_min(0).long()]
+            self._near[within_m] = (numbers >= 0) & (distance < within_m + half_cell)
+        return self._near[within_m]
+
+    def shell_nodes(self, row: int, within_m: float) -> tuple[NDArray[np.float64], float]:
+        """Positions (N, 3) of one frame's lattice points next to the shell, and the spacing."""
+        grids = self.observed_grids
+        start, shape = int(grids.offset[row]), tuple(grids.shape[row].tolist())
+        near = self._may_be_near(within_m)[start : start + int(np.prod(shape))]
+        place = np.stack(np.unravel_index(np.flatnonzero(near.cpu().numpy()), shape), -1)
+        return grids.origin[row].double().cpu().numpy() + grids.spacing * place, grids.spacing
+
+    def to_canonical(self, points: Tensor, frame: Tensor) -> BodyLookup:
+        """Observed points to canonical space; unmoved and infinitely far where no node is near."""
         numbers, weights = self.observed_grids.corners(points, frame)
-        known = weights.detach().sum(-1) > 0
-        distance = (self.observed_distance[numbers] * weights.detach()).sum(-1)
-        distance = torch.where(known, distance, torch.inf)
+        fixed = weights.detach()
+        known = fixed.sum(-1) > 0
+        distance = (self.observed_distance[numbers] * fixed).sum(-1)
+        facing = (self.observed_facing[numbers] * fixed[..., None]).sum(1)
         mapped = _blend(self.observed_maps[numbers], weights, points, self._apart)
-        return torch.where(known[:, None], mapped, points), distance
+        return BodyLookup(
+            torch.where(known[:, None], mapped, points),
+            torch.where(known, distance, torch.inf),
+            torch.nn.functional.normalize(facing, dim=-1),
+        )
 
     def to_observed(self, points: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
         """Canonical points to the observed space of their frames; and whether a node is near."""
@@ -102,6 +138,7 @@ class BodyMotion:
             "times": self.times,
             "observed_maps": self.observed_maps,
             "observed_distance": self.observed_distance,
+            "observed_facing": self.observed_facing,
             "canonical_maps": self.canonical_maps,
         }
         for prefix, grids in (("observed", self.observed_grids), ("canonical", self.canonical_grid)):
@@ -121,6 +158,7 @@ class BodyMotion:
             grids("observed"),
             named["observed_maps"],
             named["observed_distance"],
+            named["observed_facing"],
             grids("canonical"),
             named["canonical_maps"],
         )
@@ -142,19 +180,23 @@ def _blend(maps: Tensor, weights: Tensor, points: Tensor, apart: float) -> Tenso
 
 
 def build_body_motion(
-    controls: RigidControls, reach: float, configuration: BodyMotionConfig
+    controls: RigidControls,
+    prior: SignedDistancePrior,
+    reach: float,
+    configuration: BodyMotionConfig,
 ) -> BodyMotion:
     """Blend the controls' rigid motion onto lattices around the body.
 
     Args:
         controls: the mesh's motion; every one of its frames gets a lattice.
+        prior: the canonical mesh, for the direction that surfaces face.
         reach: how far from the mesh points will be asked for, metres.
     """
     spacing = configuration.node_spacing_m
     # A point within reach must find all eight corners of its cell.
     node_reach = reach + spacing * np.sqrt(3.0)
     ever_apart = controls.largest_distances()
-    lattices, maps, distances = [], [], []
+    lattices, maps, distances, facing = [], [], [], []
     for row in range(len(controls.times)):
         nodes, lattice, distance = _nodes_near(controls.surface_at(row), spacing, node_reach)
         inverse = np.swapaxes(controls.rotations[row], -1, -2)
@@ -162,6 +204,7 @@ def build_body_motion(
         lattices.append(lattice)
         distances.append(distance)
         maps.append(_node_maps(nodes, source, target, inverse, ever_apart, configuration))
+        facing.append(_facing(nodes, maps[-1], prior))
     canonical_nodes, canonical_lattice, _ = _nodes_near(controls.surface, spacing, node_reach)
     canonical_maps = [
         _node_maps(
@@ -179,6 +222,7 @@ def build_body_motion(
         _pack(lattices, spacing),
         torch.from_numpy(np.concatenate(maps)),
         torch.from_numpy(np.concatenate(distances)),
+        torch.cat(facing),
         _pack([canonical_lattice], spacing),
         torch.from_numpy(np.stack(canonical_maps)),
     )
@@ -220,6 +264,13 @@ def _node_maps(
     mapped = np.einsum("nk,nki->ni", weights, moved + target[near])
     shift = mapped - np.einsum("nij,nj->ni", blended, nodes)
     return np.concatenate([np.swapaxes(blended, -1, -2), shift[:, None]], 1).astype(np.float32)
+
+
+def _facing(nodes: Array, maps: Array, prior: SignedDistancePrior) -> Tensor:
+    """Canonical normals at the mapped nodes, turned back into observed space, (N, 3)."""
+    turn = torch.from_numpy(maps[:, :3])
+    mapped = (torch.from_numpy(nodes)[:, None] @ turn)[:, 0] + torch.from_numpy(maps[:, 3])
+    return (turn @ prior.normals(mapped)[..., None])[..., 0]
 
 
 def _nearest_rotation(matrices: Array) -> Array:

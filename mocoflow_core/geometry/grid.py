@@ -8,6 +8,7 @@ of points from many frames is one look-up.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -59,21 +60,27 @@ class SparseGrids:
             float(tensors["spacing"]),
         )
 
+    def boxes(self) -> tuple[Tensor, Tensor]:
+        """Lower and upper corners (G, 3) of the lattices."""
+        return self.origin, self.origin + self.spacing * (self.shape - 1)
+
     def _lattice(self, points: Tensor, grid: Tensor) -> Tensor:
-        return (points - self.origin[grid]) / self.spacing
+        """Lattice coordinates (P, 3), moved onto the border from outside.
 
-    def _numbers(self, position: Tensor, grid: Tensor) -> Tensor:
-        """Node numbers at integer lattice positions (..., 3); -1 outside."""
+        Lattices reach beyond their nodes, so nothing on the border is near a node.
+        """
+        coordinates = (points - self.origin[grid]) / self.spacing
+        return torch.minimum(coordinates, (self.shape[grid] - 1).to(points)).clamp_min(0.0)
+
+    def _flat(self, position: Tensor, grid: Tensor) -> Tensor:
+        """Index in ``node_map`` of integer lattice positions (P, 3) of grids (P,)."""
         shape = self.shape[grid]
-        inside = ((position >= 0) & (position < shape)).all(-1)
-        flat = (position[..., 0] * shape[..., 1] + position[..., 1]) * shape[..., 2]
-        flat = self.offset[grid] + flat + position[..., 2]
-        numbers = self.node_map[torch.where(inside, flat, 0)].long()
-        return torch.where(inside, numbers, -1)
+        x, y, z = position.unbind(-1)
+        return self.offset[grid] + (x * shape[:, 1] + y) * shape[:, 2] + z
 
-    def has_node(self, points: Tensor, grid: Tensor) -> Tensor:
-        """Whether the lattice point nearest to each point (P, 3) of grid (P,) is a node."""
-        return self._numbers(torch.round(self._lattice(points, grid)).long(), grid) >= 0
+    def flat_nearest(self, points: Tensor, grid: Tensor) -> Tensor:
+        """Index (P,) in ``node_map`` of the lattice point nearest to each point (P, 3)."""
+        return self._flat(torch.round(self._lattice(points, grid)).long(), grid)
 
     def corners(self, points: Tensor, grid: Tensor) -> tuple[Tensor, Tensor]:
         """Numbers (P, 8) and trilinear weights (P, 8) of the nodes around each point.
@@ -82,21 +89,55 @@ class SparseGrids:
         node around it has all weights zero. Differentiable in ``points`` through the weights.
         """
         lattice = self._lattice(points, grid)
-        base = torch.floor(lattice.detach())
-        fraction = lattice - base
-        corner = _CORNERS.to(points.device)
-        numbers = self._numbers(base.long()[:, None] + corner, grid[:, None])
-        sides = torch.stack([1.0 - fraction, fraction], 1)  # (P, 2, 3)
-        weights = (sides[:, :, None, None, 0] * sides[:, None, :, None, 1]).squeeze(-1)[..., None]
-        weights = (weights * sides[:, None, None, :, 2]).reshape(-1, 8)
-        weights = weights * (numbers >= 0)
+        base = torch.minimum(lattice.detach().long(), self.shape[grid] - 2)
+        far = lattice - base
+        near = 1.0 - far
+        (x0, y0, z0), (x1, y1, z1) = near.unbind(-1), far.unbind(-1)
+        xy = torch.stack([x0 * y0, x0 * y1, x1 * y0, x1 * y1], -1)
+        weights = torch.stack([xy * z0[:, None], xy * z1[:, None]], -1).flatten(1)
+        numbers = self.node_map[self._flat(base, grid)[:, None] + self._corner_steps()[grid]]
+        known = numbers >= 0
+        weights = weights * known
         total = weights.sum(-1, keepdim=True)
+        # A point exactly on a missing corner has total zero and stays unknown.
         scaled = weights / total.clamp_min(torch.finfo(weights.dtype).tiny)
-        return numbers.clamp_min(0), torch.where(total > 0, scaled, weights)
+        return numbers.clamp_min(0).long(), scaled
+
+    def _corner_steps(self) -> Tensor:
+        """Steps (G, 8) in ``node_map`` from a cell's first corner to each of its corners."""
+        rows = torch.stack([self.shape[:, 1] * self.shape[:, 2], self.shape[:, 2]], -1)
+        strides = torch.cat([rows, torch.ones_like(rows[:, :1])], -1)
+        return strides @ _CORNERS.to(strides.device).T
 
 
-def gather(table: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
-    """Weighted sums of table rows: (N, C), (P, 8), (P, 8) -> (P, C)."""
-    return torch.nn.functional.embedding_bag(
-        numbers, table, per_sample_weights=weights, mode="sum"
-    )
+class WeightedRows(torch.autograd.Function):
+    """Weighted sums of table rows: table (N, C), numbers (P, 8), weights (P, 8) -> (P, C).
+
+    What ``(table[numbers] * weights[..., None]).sum(1)`` computes, without the (P, 8, C)
+    intermediate in the forward pass.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, table: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
+        ctx.save_for_backward(table, numbers, weights)
+        return torch.nn.functional.embedding_bag(
+            numbers, table, per_sample_weights=weights, mode="sum"
+        )
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, None, Tensor | None]:  # type: ignore[override]
+        table, numbers, weights = ctx.saved_tensors
+        for_table = for_weights = None
+        if ctx.needs_input_grad[0]:
+            spread = weights[..., None] * gradient[:, None]
+            for_table = torch.zeros_like(table).index_add_(
+                0, numbers.flatten(), spread.flatten(0, 1)
+            )
+        if ctx.needs_input_grad[2]:
+            for_weights = (table[numbers] @ gradient[..., None])[..., 0]
+        return for_table, None, for_weights
+
+
+def weighted_rows(table: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
+    """Differentiable weighted sums of table rows, (P, C); see ``WeightedRows``."""
+    return WeightedRows.apply(table, numbers, weights)  # type: ignore[no-any-return]

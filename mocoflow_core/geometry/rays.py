@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -28,23 +29,28 @@ class Rays:
         return Rays(self.origins[rows], self.directions[rows])
 
 
-def pixel_rays(camera: Camera, pixels: Tensor) -> Rays:
+def pixel_rays(camera: Camera, pixels: Tensor) -> tuple[Rays, Tensor]:
     """Rays through the centres of pixels.
 
     Args:
         camera: a pinhole (distortion already removed).
         pixels: (R,) flat row-major pixel indices.
+
+    Returns:
+        the rays, and the distance (R,) along each for one metre of depth along the viewing axis.
     """
     x = (pixels % camera.width) + 0.5
     y = torch.div(pixels, camera.width, rounding_mode="floor") + 0.5
     # The inverse intrinsics and the rotation are combined in float64: they are tiny.
-    rotation = torch.from_numpy(camera.R.T).double()
-    inverse = rotation @ torch.linalg.inv(torch.from_numpy(camera.K).double())
+    inverse = torch.from_numpy(camera.R.T @ np.linalg.inv(camera.K)).to(pixels.device)
     homogeneous = torch.stack([x, y, torch.ones_like(x)], -1).double()
-    directions = homogeneous @ inverse.T.to(homogeneous.device)
-    directions = directions / directions.norm(dim=-1, keepdim=True)
+    directions = homogeneous @ inverse.T
+    along = directions.norm(dim=-1)
     centre = torch.from_numpy(camera.centre_world).to(directions)
-    return Rays(centre.expand_as(directions).float(), directions.float())
+    rays = Rays(
+        centre.expand_as(directions).float(), (directions / along[:, None]).float()
+    )
+    return rays, along.float()
 
 
 def intersect_boxes(rays: Rays, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:

@@ -6,46 +6,42 @@ A twist is ``(omega, v)``: rotation vector in radians and translation part in me
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
 # Below this squared angle the coefficients come from their Taylor series: the closed forms cancel
-# there, and their derivatives divide by zero at zero. Eight terms are exact in float64.
+# there, and their derivatives divide by zero at zero.
 _SERIES_BELOW = 0.25
-_SERIES_TERMS = 8
+# Terms after which the series is exact to rounding below that angle: 0.25^n / (2n + 1)!.
+_SERIES_TERMS = {torch.float64: 8}
+_FEW_TERMS = 4
 
 
-def _series(squared_angle: Tensor, first_factorial: int) -> Tensor:
-    """Sum over k of ``(-s)^k / (first_factorial + 2k)!`` by Horner's rule."""
-    result = torch.zeros_like(squared_angle)
-    for k in reversed(range(_SERIES_TERMS)):
-        factorial = 1.0
-        for factor in range(2, first_factorial + 2 * k + 1):
-            factorial *= factor
-        result = result * -squared_angle + 1.0 / factorial
+def _series(squared_angle: Tensor) -> Tensor:
+    """The three coefficients (..., 3) by Horner's rule: ``sum_k (-s)^k / (j + 2k)!``, j = 1..3."""
+    result = squared_angle.new_zeros(3)
+    for k in reversed(range(_SERIES_TERMS.get(squared_angle.dtype, _FEW_TERMS))):
+        inverse = [1.0 / math.factorial(j + 2 * k) for j in (1, 2, 3)]
+        result = squared_angle.new_tensor(inverse) - result * squared_angle
     return result
 
 
 def _coefficients(squared_angle: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """``sin(a)/a``, ``(1 - cos a)/a^2`` and ``(a - sin a)/a^3``, smooth in ``a^2``.
+    """``sin(a)/a``, ``(1 - cos a)/a^2`` and ``(a - sin a)/a^3``, smooth in ``a^2`` (..., 1).
 
-    Both branches of each ``where`` stay finite, so that no NaN enters the gradient.
+    Both branches of the ``where`` stay finite, so that no NaN enters the gradient.
     """
     small = squared_angle < _SERIES_BELOW
-    for_series = torch.where(small, squared_angle, torch.zeros_like(squared_angle))
-    for_closed = torch.where(small, torch.ones_like(squared_angle), squared_angle)
-    angle = for_closed.sqrt()
-    sine = torch.sin(angle)
-    half_sine = torch.sin(0.5 * angle)
-    closed = (
-        sine / angle,
-        2.0 * half_sine * half_sine / for_closed,
-        (angle - sine) / (angle * for_closed),
+    series = _series(torch.where(small, squared_angle, 0.0))
+    safe = torch.where(small, 1.0, squared_angle)
+    angle = safe.sqrt()
+    sine, half_sine = torch.sin(angle), torch.sin(0.5 * angle)
+    closed = torch.cat(
+        [sine / angle, 2.0 * half_sine * half_sine / safe, (angle - sine) / (angle * safe)], -1
     )
-    a, b, c = (
-        torch.where(small, _series(for_series, order), value)
-        for order, value in zip((1, 2, 3), closed, strict=True)
-    )
+    a, b, c = torch.where(small, series, closed).split(1, -1)
     return a, b, c
 
 

@@ -1,0 +1,69 @@
+"""The fast motion field: what the body mesh says, corrected by a learned residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from mocoflow_core.fields.motion_body import BodyMotion
+from mocoflow_core.fields.motion_residual import ResidualConfig, ResidualMotion
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What the motion needs to know about the moments that points belong to, one row each."""
+
+    body: BodyMotion  # its frames are the rows
+    codes: Tensor  # (G, C)
+
+    def to(self, device: torch.device) -> Moments:
+        return Moments(self.body.to(device), self.codes.to(device))
+
+
+class HybridMotion(nn.Module):
+    """``to_canonical`` and ``to_observed`` (the paper's M^bw and M^fw) on top of the body.
+
+    The residual of either direction acts in canonical space, where its input is bounded.
+    """
+
+    def __init__(
+        self, times: Tensor, centre: Tensor, radius: float, configuration: ResidualConfig
+    ) -> None:
+        """Args: times (F,) of the training frames, normalised, ascending."""
+        super().__init__()
+        self.register_buffer("times", times.double(), persistent=False)
+        self.codes = nn.Parameter(0.1 * torch.randn(len(times), configuration.code_width))
+        self.residual_to_canonical = ResidualMotion(centre, radius, configuration)
+        self.residual_to_observed = ResidualMotion(centre, radius, configuration)
+
+    def anneal(self, band_alpha: float) -> None:
+        for residual in (self.residual_to_canonical, self.residual_to_observed):
+            residual.encoding.anneal(band_alpha)
+
+    def codes_at(self, times: Tensor) -> Tensor:
+        """Codes (G, C) at any times (G,), linear between training frames."""
+        return interpolate_rows(self.codes, self.times, times)
+
+    def correct(self, body_canonical: Tensor, row: Tensor, moments: Moments) -> Tensor:
+        """Where canonical points of the body's motion really lie, (P, 3)."""
+        return self.residual_to_canonical(body_canonical, moments.codes[row])
+
+    def to_canonical(self, points: Tensor, row: Tensor, moments: Moments) -> Tensor:
+        """Observed points (P, 3) of moments (P,) to canonical space."""
+        return self.correct(moments.body.to_canonical(points, row).canonical, row, moments)
+
+    def to_observed(self, points: Tensor, row: Tensor, moments: Moments) -> tuple[Tensor, Tensor]:
+        """Canonical points (P, 3) to the space of their moments; and where the body is near."""
+        return moments.body.to_observed(self.residual_to_observed(points, moments.codes[row]), row)
+
+
+def interpolate_rows(values: Tensor, at: Tensor, times: Tensor) -> Tensor:
+    """Rows (F, C) given at ascending times (F,), linearly interpolated at times (G,), (G, C)."""
+    if len(at) == 1:
+        return values.expand(len(times), -1)
+    times = times.double().clamp(at[0], at[-1])
+    after = torch.searchsorted(at, times).clamp(1, len(at) - 1)
+    share = ((times - at[after - 1]) / (at[after] - at[after - 1])).to(values.dtype)[:, None]
+    return (1.0 - share) * values[after - 1] + share * values[after]

@@ -1,0 +1,52 @@
+"""What fixes the shape of a scene's fields: their configuration and what the mesh gives."""
+
+from __future__ import annotations
+
+import torch
+from pydantic import Field
+from torch import Tensor
+
+from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.fields.canonical_grid import CanonicalConfig, CanonicalGrid, nested_grids
+from mocoflow_core.fields.lighting import FixedLight
+from mocoflow_core.fields.motion_body import BodyMotionConfig
+from mocoflow_core.fields.motion_hybrid import HybridMotion
+from mocoflow_core.fields.motion_residual import ResidualConfig
+from mocoflow_core.fields.scene_field import SceneField
+from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
+
+
+class MotionConfig(ConfigurationPart):
+    """The hybrid motion: the body's own and the residual on top."""
+
+    body: BodyMotionConfig = BodyMotionConfig()
+    residual: ResidualConfig = ResidualConfig()
+
+
+class SceneShape(ConfigurationPart):
+    """Everything besides the weights that is needed to build a scene's fields again."""
+
+    canonical: CanonicalConfig
+    motion: MotionConfig
+    times: tuple[float, ...] = Field(description="training frames, normalised")
+    shell_width_m: float = Field(gt=0)
+    inner_depth_m: float = Field(gt=0)
+    step_m: float = Field(gt=0, description="distance between samples")
+    light: bool = Field(description="a fixed light shades by the direction that surfaces face")
+
+    def build(self, prior: SignedDistancePrior) -> SceneField:
+        """Fields with fresh weights, drawn from torch's global generator."""
+        outside = self.shell_width_m + self.canonical.margin_m
+        grids = nested_grids(prior, outside, self.inner_depth_m, self.canonical)
+        light = FixedLight() if self.light else None
+        centre, radius = _middle(prior)
+        motion = HybridMotion(
+            torch.tensor(self.times, dtype=torch.float64), centre, radius, self.motion.residual
+        )
+        return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, light))
+
+
+def _middle(prior: SignedDistancePrior) -> tuple[Tensor, float]:
+    """Centre and half the longest side of the lattice's box: coordinates fall into [-1, 1]."""
+    side = prior.spacing * (torch.tensor(prior.lattice.shape) - 1)
+    return prior.origin + 0.5 * side, float(0.5 * side.max())

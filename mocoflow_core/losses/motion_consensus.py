@@ -1,0 +1,41 @@
+"""Motion consensus: both directions of the motion have to agree, at one moment and across two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+# Points (P, 3) of moments (P,) -> moved points (P, 3) and where they are known (P,).
+Move = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
+
+
+def local_consensus(to_canonical: Move, to_observed: Move, points: Tensor, row: Tensor) -> Tensor:
+    """``|to_observed(to_canonical(x, t_i), t_i) - x|``, L1 over axes, mean over points, metres.
+
+    An empty selection gives exactly 0. Source: MoCo-Flow eq. 3.
+    """
+    canonical, known = to_canonical(points, row)
+    back, known_back = to_observed(canonical, row)
+    return _mean_l1(back - points, known & known_back)
+
+
+def global_consensus(
+    to_canonical: Move, to_observed: Move, points: Tensor, row: Tensor, other_row: Tensor
+) -> Tensor:
+    """The chain through another moment t_j and back to x; L1 over axes, mean, metres.
+
+    ``to_observed(to_canonical(to_observed(to_canonical(x, t_i), t_j), t_j), t_i) - x``.
+    Source: MoCo-Flow eq. 2.
+    """
+    canonical, known = to_canonical(points, row)
+    elsewhere, known_1 = to_observed(canonical, other_row)
+    canonical_again, known_2 = to_canonical(elsewhere, other_row)
+    back, known_3 = to_observed(canonical_again, row)
+    return _mean_l1(back - points, known & known_1 & known_2 & known_3)
+
+
+def _mean_l1(difference: Tensor, known: Tensor) -> Tensor:
+    summed = (difference.abs().sum(-1) * known).sum()
+    return summed / known.sum().clamp_min(1).to(torch.promote_types(summed.dtype, torch.float32))

@@ -1,0 +1,1 @@
+"""From fields to pixels: samples along rays, compositing, views."""

@@ -1,0 +1,60 @@
+"""Which pixels can show the person, and between which depths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from mocoflow_core.fields.motion_body import BodyMotion
+from mocoflow_core.geometry.camera import Camera
+
+_CLOSEST_M = 0.05  # nodes nearer to the camera's plane than this cannot be projected
+
+
+@dataclass(frozen=True, eq=False)
+class ShellPixels:
+    """Pixels that the shell projects to, with the depth range of the shell behind each."""
+
+    pixels: Tensor  # (N,) flat indices, ascending
+    nearest: Tensor  # (N,) metres along the viewing axis
+    farthest: Tensor  # (N,)
+
+
+def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: float) -> ShellPixels:
+    """Pixels that rays through the shell of one moment can belong to.
+
+    Each lattice node of the shell paints a disc that covers its cell. Painted from far to near,
+    the discs leave the nearest depth, from near to far the farthest.
+    """
+    points, spacing = body.shell_nodes(row, shell_width_m)
+    depth = camera.to_camera(points)[:, 2]
+    visible = depth > _CLOSEST_M
+    at, depth = camera.project(points[visible]), depth[visible]
+    cell_radius = 0.5 * np.sqrt(3.0) * spacing
+    focal = max(camera.K[0, 0], camera.K[1, 1])
+    radius = np.ceil(cell_radius * focal / np.maximum(depth - cell_radius, _CLOSEST_M))
+    order = np.argsort(depth)
+    farthest = _paint(camera, at[order], radius[order], depth[order])
+    nearest = _paint(camera, at[order[::-1]], radius[order[::-1]], depth[order[::-1]])
+    pixels = np.flatnonzero(farthest)
+    return ShellPixels(
+        torch.from_numpy(pixels),
+        torch.from_numpy(nearest.ravel()[pixels] - cell_radius).float(),
+        torch.from_numpy(farthest.ravel()[pixels] + cell_radius).float(),
+    )
+
+
+def _paint(
+    camera: Camera, at: NDArray, radius: NDArray, depth: NDArray
+) -> NDArray[np.float32]:
+    image = np.zeros((camera.height, camera.width), np.float32)
+    limit = 4 * (camera.width + camera.height)
+    for (x, y), r, value in zip(at, radius, depth, strict=True):
+        if abs(x) < limit and abs(y) < limit:
+            cv2.circle(image, (int(x), int(y)), int(r), float(value), -1)
+    return image

@@ -1,0 +1,1 @@
+"""Schedule, stages, loop, checkpoints and the guard of the optimisation."""

@@ -1,0 +1,72 @@
+"""Training pixels: the frames on the device, and random rays where the person can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.fields.motion_body import BodyMotion
+from mocoflow_core.geometry.rays import Rays, pixel_rays
+from mocoflow_core.rendering.pixels import shell_pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """R rays with what the camera saw along them."""
+
+    rays: Rays
+    row: Tensor  # (R,) training frame of each ray
+    near: Tensor  # (R,) metres along the ray between which the shell lies
+    far: Tensor  # (R,)
+    rgb: Tensor  # (R, 3) in [0, 1]
+    mask: Tensor  # (R,) 1 on the person
+    has_mask: Tensor  # (R,) 0 where the frame came without a mask
+    background: Tensor  # (R, 3)
+    jitter: Tensor  # (R,) in [0, 1)
+
+
+class TrainingPixels:
+    """The training frames of a clip and, per frame, the pixels that the shell projects to.
+
+    Pixels that the shell does not reach show the background whatever is learned, so no ray goes
+    there.
+    """
+
+    def __init__(self, clip: Clip, body: BodyMotion, shell_width_m: float) -> None:
+        rows = np.flatnonzero(~clip.held_out)
+        self.camera = clip.camera
+        pixels = clip.camera.width * clip.camera.height
+        self.frames = torch.from_numpy(clip.frames[rows].reshape(len(rows), pixels, 3))
+        self.masks = torch.from_numpy(clip.masks[rows].reshape(len(rows), pixels))
+        self.has_mask = torch.from_numpy(clip.has_mask[rows])
+        self.background = torch.from_numpy(clip.background.reshape(pixels, 3).copy())
+        shells = [shell_pixels(clip.camera, body, row, shell_width_m) for row in range(len(rows))]
+        self.candidates = torch.cat([shell.pixels for shell in shells])
+        self.nearest = torch.cat([shell.nearest for shell in shells])
+        self.farthest = torch.cat([shell.farthest for shell in shells])
+        self.counts = torch.tensor([len(shell.pixels) for shell in shells])
+        self.starts = torch.cumsum(self.counts, 0) - self.counts
+
+    def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
+        """Rays of a few frames, uniform over frames and over each frame's candidate pixels."""
+        chosen = torch.randint(len(self.counts), (frames,), generator=generator)
+        row = chosen.repeat_interleave(-(-rays // frames))[:rays]
+        place = torch.rand(rays, generator=generator, dtype=torch.float64)
+        found = self.starts[row] + (place * self.counts[row]).long()
+        pixel = self.candidates[found]
+        through, along = pixel_rays(self.camera, pixel)
+        return Batch(
+            through,
+            row,
+            self.nearest[found] * along,
+            self.farthest[found] * along,
+            self.frames[row, pixel].float() / 255.0,
+            self.masks[row, pixel].float(),
+            self.has_mask[row].float(),
+            self.background[pixel].float() / 255.0,
+            torch.rand(rays, generator=generator),
+        )

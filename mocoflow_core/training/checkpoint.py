@@ -1,0 +1,94 @@
+"""Checkpoints of the optimisation: everything that a resumed run needs to end the same."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import torch
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+from torch import Tensor, nn
+
+from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.guard import GuardEvent
+
+_FILE = "checkpoint.safetensors"
+
+
+@dataclass
+class Progress:
+    """Where the optimisation stands. Threads and steps are fixed at the first start."""
+
+    threads: int
+    steps: int
+    step: int = 0
+    snapshots: int = 0
+    rate_scale: float = 1.0
+    elapsed: Seconds = field(default_factory=Seconds)
+    events: list[GuardEvent] = field(default_factory=list)
+    tries: int = 1
+
+    def to_json(self) -> str:
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Progress:
+        values = json.loads(text)
+        values["elapsed"] = Seconds(**values["elapsed"])
+        values["events"] = [GuardEvent(**event) for event in values["events"]]
+        return cls(**values)
+
+
+def save_checkpoint(
+    folder: Path,
+    progress: Progress,
+    model: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    generator: torch.Generator,
+) -> None:
+    """Write beside, flush, rename: a kill at any moment leaves the old or the new checkpoint."""
+    tensors = {f"model.{name}": value for name, value in model.state_dict().items()}
+    for index, state in optimiser.state_dict()["state"].items():
+        tensors |= {f"optimiser.{index}.{name}": value for name, value in state.items()}
+    tensors["generator"] = generator.get_state()
+    beside = folder / (_FILE + ".tmp")
+    save_file(tensors, beside, metadata={"progress": progress.to_json()})
+    with beside.open("rb") as file:
+        os.fsync(file.fileno())
+    beside.replace(folder / _FILE)
+
+
+def load_checkpoint(
+    folder: Path, model: nn.Module, optimiser: torch.optim.Optimizer, generator: torch.Generator
+) -> Progress | None:
+    """Restore a checkpoint into the given objects; None where there is none."""
+    path = folder / _FILE
+    if not path.is_file():
+        return None
+    tensors = load_file(path)
+    model.load_state_dict(_under("model.", tensors))
+    state: dict[int, dict[str, Tensor]] = {}
+    for name, value in _under("optimiser.", tensors).items():
+        index, part = name.split(".", 1)
+        state.setdefault(int(index), {})[part] = value
+    optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
+    generator.set_state(tensors["generator"])
+    return Progress.from_json(read_metadata(path)["progress"])
+
+
+def remove_checkpoint(folder: Path) -> None:
+    """The stage is done: its checkpoint is no longer needed."""
+    (folder / _FILE).unlink(missing_ok=True)
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """The text entries of a safetensors file's header."""
+    with safe_open(path, framework="pt") as file:
+        return dict(file.metadata())
+
+
+def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    return {name[len(prefix) :]: t for name, t in tensors.items() if name.startswith(prefix)}

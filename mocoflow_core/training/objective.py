@@ -1,0 +1,103 @@
+"""The sum of losses that one step minimises."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from mocoflow_core.fields.motion_hybrid import Moments
+from mocoflow_core.fields.scene_field import SceneField
+from mocoflow_core.losses.motion_consensus import Move, global_consensus, local_consensus
+from mocoflow_core.losses.photometric import photometric, silhouette
+from mocoflow_core.losses.weights import LossConfig
+from mocoflow_core.rendering.renderer import RenderedRays, render_rays
+from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.training.batches import Batch
+
+
+class Objective:
+    """Losses of a batch by name, already weighted; their sum is minimised."""
+
+    def __init__(
+        self,
+        field: SceneField,
+        moments: Moments,
+        losses: LossConfig,
+        sampling: SamplingConfig,
+        shell_width_m: float,
+        motion_learned: bool,
+    ) -> None:
+        self.field = field
+        self.moments = moments
+        self.losses = losses
+        self.sampling = sampling
+        self.shell_width_m = shell_width_m
+        self.motion_learned = motion_learned
+
+    def __call__(self, batch: Batch, generator: torch.Generator) -> dict[str, Tensor]:
+        weights = self.losses
+        rendered = render_rays(
+            self.field,
+            self.moments,
+            batch.rays,
+            batch.row,
+            batch.near,
+            batch.far,
+            self.field.appearance,
+            batch.background,
+            batch.jitter,
+            self.shell_width_m,
+            self.sampling,
+        )
+        terms = {
+            "photometric": photometric(rendered.rgb, batch.rgb),
+            "silhouette": weights.silhouette_weight
+            * silhouette(rendered.opacity * batch.has_mask, batch.mask * batch.has_mask),
+            "offset": weights.offset_weight * (rendered.offset_m**2).sum()
+            / max(len(rendered.offset_m), 1),
+        }
+        if self.field.appearance.requires_grad:
+            terms["appearance"] = weights.appearance_weight * (self.field.appearance**2).mean()
+        if self.motion_learned:
+            terms |= self._motion_terms(rendered, generator)
+        return terms
+
+    def _motion_terms(self, rendered: RenderedRays, generator: torch.Generator) -> dict[str, Tensor]:
+        """Consensus and regularity of the motion at a few samples that have density."""
+        weights, shell = self.losses, rendered.shell
+        solid = (rendered.density.detach() > weights.density_threshold).nonzero()[:, 0]
+        pick = torch.randint(
+            max(len(solid), 1), (min(weights.consensus_points, len(solid)),), generator=generator
+        )
+        chosen = solid[pick]
+        points, body, row = shell.samples.points[chosen], shell.canonical[chosen], shell.row[chosen]
+        motion, codes = self.field.motion, self.moments.codes
+        moved = motion.correct(body, row, self.moments)
+        neighbour = (row + 1).clamp_max(len(codes) - 1)
+        later = motion.correct(body, neighbour, self.moments)
+        count = max(len(chosen), 1)
+        terms = {
+            "residual": weights.residual_weight * ((moved - body) ** 2).sum() / count,
+            "smoothness": weights.smoothness_weight * ((moved - later) ** 2).sum() / count,
+        }
+        if weights.consensus_weight > 0:
+            to_canonical, to_observed = self._moves()
+            other = torch.randint(len(codes), (1,), generator=generator).expand_as(row)
+            local = local_consensus(to_canonical, to_observed, points, row)
+            far = global_consensus(to_canonical, to_observed, points, row, other)
+            terms["consensus"] = weights.consensus_weight * (
+                weights.local_share * local + weights.global_share * far
+            )
+        return terms
+
+    def _moves(self) -> tuple[Move, Move]:
+        motion, moments = self.field.motion, self.moments
+
+        def to_canonical(points: Tensor, row: Tensor) -> tuple[Tensor, Tensor]:
+            found = moments.body.to_canonical(points, row)
+            return motion.correct(found.canonical, row, moments), torch.isfinite(found.distance)
+
+        def to_observed(points: Tensor, row: Tensor) -> tuple[Tensor, Tensor]:
+            return motion.to_observed(points, row, moments)
+
+        return to_canonical, to_observed
