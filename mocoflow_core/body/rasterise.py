@@ -27,7 +27,9 @@ class Raster(NamedTuple):
         return self.face_index >= 0
 
 
-def rasterise(vertices_world: Floats, faces: NDArray[np.int32], camera: Camera) -> Raster:
+def rasterise(
+    vertices_world: NDArray[np.floating], faces: NDArray[np.int32], camera: Camera
+) -> Raster:
     """The first surface behind the centre of each pixel of an undistorted camera.
 
     Args:

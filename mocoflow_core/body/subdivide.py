@@ -16,9 +16,9 @@ class Subdivision:
     weights: sparse.csr_matrix  # (fine V, coarse V), rows sum to one
     faces: NDArray[np.int32]  # (fine F, 3)
 
-    def refine(self, values: NDArray[np.floating]) -> NDArray[np.floating]:
+    def refine(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
         """Values (fine V, C) at the fine vertices from values (V, C) at the coarse ones."""
-        return self.weights @ values
+        return np.asarray(self.weights @ values, np.float64)
 
 
 def subdivide(faces: NDArray[np.int32], vertex_count: int, levels: int) -> Subdivision:

@@ -1,0 +1,67 @@
+"""Pictures and videos inside the page itself, as data URIs."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from PIL import Image
+
+Picture = NDArray[np.uint8]  # (H, W, 3) sRGB-encoded
+
+# A difference of half the range is drawn in the darkest colour.
+LARGEST_DIFFERENCE = 0.5
+# Tried from large to small until all pictures together fit.
+SIDES_PX = (640, 480, 360, 280, 200, 140, 96)
+WEBP_QUALITY = 82
+
+
+def read_picture(path: Path) -> Picture:
+    """An image file as RGB bytes."""
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def fitted(picture: Picture, side_px: int) -> Picture:
+    """The picture, made smaller if a side is longer than ``side_px``."""
+    scale = side_px / max(picture.shape[:2])
+    if scale >= 1.0:
+        return picture
+    height, width = (max(round(scale * size), 1) for size in picture.shape[:2])
+    smaller = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(smaller, np.uint8)
+
+
+def difference_picture(picture: Picture, reference: Picture) -> Picture:
+    """Mean absolute difference over the channels: white where equal, dark where far apart."""
+    distance = np.abs(picture.astype(np.float32) - reference.astype(np.float32)).mean(axis=-1)
+    share = (distance / (255.0 * LARGEST_DIFFERENCE)).clip(0.0, 1.0)
+    return np.round(255.0 * colormaps["gist_heat_r"](share)[..., :3]).astype(np.uint8)
+
+
+def webp(picture: Picture) -> bytes:
+    """The picture as a WebP file."""
+    buffer = io.BytesIO()
+    Image.fromarray(picture).save(buffer, "WEBP", quality=WEBP_QUALITY, method=4)
+    return buffer.getvalue()
+
+
+def webps_within(pictures: Sequence[Picture], budget_bytes: int) -> list[bytes]:
+    """All pictures as WebP files, as large as fits into the budget together."""
+    files: list[bytes] = []
+    for side in SIDES_PX:
+        files = [webp(fitted(picture, side)) for picture in pictures]
+        if sum(map(len, files)) <= budget_bytes:
+            break
+    return files
+
+
+def data_uri(content: bytes, media_type: str) -> str:
+    """The content as text that a page can carry."""
+    return f"data:{media_type};base64,{base64.b64encode(content).decode('ascii')}"

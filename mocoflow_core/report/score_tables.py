@@ -1,0 +1,157 @@
+"""Scores arranged for reading: per camera and method, before and after, and the key numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mocoflow_core.metrics.table import ScoreRow
+from mocoflow_core.report.inputs import BASELINE
+from mocoflow_core.report.metric_labels import (
+    BODY_METRICS,
+    VIEW_METRICS,
+    MetricLabel,
+    label_of,
+)
+
+HEADLINES = ("psnr_union", "ssim", "mask_iou", "keypoint_mm")
+
+
+class Cell(NamedTuple):
+    """One mean; ``best`` where no other method of the camera is better."""
+
+    text: str
+    best: bool
+
+
+class CameraRow(NamedTuple):
+    """The means of one method at one camera."""
+
+    camera: str
+    method: str
+    views: int
+    cells: list[Cell]
+
+
+class ViewTable(NamedTuple):
+    """Mean scores with the protocols they were measured under."""
+
+    labels: list[MetricLabel]
+    groups: list[list[CameraRow]]  # one for each camera, one row for each method
+    protocols: list[str]
+
+
+class Repair(NamedTuple):
+    """An error before and after the optimisation."""
+
+    title: str
+    before: str
+    after: str
+    change: str
+    better: bool
+
+
+class Headline(NamedTuple):
+    """One key number of the run."""
+
+    title: str
+    value: str
+    unit: str
+    note: str
+
+
+def view_table(rows: Sequence[ScoreRow], train_camera: str) -> ViewTable:
+    """Means over frames for each camera and method, held-out cameras together on top."""
+    rows = [row for row in rows if row.metric not in BODY_METRICS]
+    metrics = _ordered({row.metric for row in rows})
+    cameras = sorted({row.camera for row in rows}, key=lambda name: (name == train_camera, name))
+    others = [camera for camera in cameras if camera != train_camera]
+    groups = [(camera, [camera]) for camera in cameras]
+    if len(others) > 1:
+        groups.insert(0, (f"all {len(others)} held-out cameras", others))
+    table = []
+    for title, members in groups:
+        suffix = ", held-out frames" if members == [train_camera] else ""
+        members_rows = [row for row in rows if row.camera in members]
+        table.append(_camera_rows(title + suffix, members_rows, metrics))
+    protocols = sorted({row.protocol for row in rows if row.protocol})
+    return ViewTable([label_of(metric) for metric in metrics], table, protocols)
+
+
+def repairs(rows: Sequence[ScoreRow], method: str) -> list[Repair]:
+    """Errors of motion and shape, medians over frames; before = what the given mesh had."""
+    found = []
+    for metric, label in BODY_METRICS.items():
+        before = _values(rows, BASELINE, metric)
+        after = _values(rows, method, metric)
+        if not after and not before:
+            continue
+        old = float(np.nanmedian(before)) if before else float("nan")
+        new = float(np.nanmedian(after)) if after else float("nan")
+        change = f"{100 * (new - old) / old:+.0f} %" if before and after and old > 0 else ""
+        found.append(
+            Repair(label.title, label.with_unit(old), label.with_unit(new), change, new < old)
+        )
+    return found
+
+
+def headlines(rows: Sequence[ScoreRow], method: str, train_camera: str) -> list[Headline]:
+    """The key numbers over held-out cameras, or over the train camera's held-out frames."""
+    novel = [row for row in rows if row.camera != train_camera]
+    seen = [row for row in rows if row.metric not in BODY_METRICS]
+    judged = novel if any(row.method == method for row in novel) else seen
+    found = []
+    for metric in HEADLINES:
+        source = rows if metric in BODY_METRICS else judged
+        ours, theirs = _values(source, method, metric), _values(source, BASELINE, metric)
+        if not ours:
+            continue
+        average = np.nanmedian if metric in BODY_METRICS else np.mean
+        label, value = label_of(metric), float(average(ours))
+        note = ""
+        if theirs:
+            before = float(average(theirs))
+            name = "before" if metric in BODY_METRICS else "posed mesh"
+            note = f"{name} {label.text(before)}"
+        found.append(Headline(label.title, label.text(value), label.unit, note))
+    return found
+
+
+def _camera_rows(title: str, rows: list[ScoreRow], metrics: list[str]) -> list[CameraRow]:
+    methods = list(dict.fromkeys(row.method for row in rows))
+    means = {
+        (method, metric): float(np.mean(values)) if values else float("nan")
+        for method in methods
+        for metric in metrics
+        for values in [_values(rows, method, metric)]
+    }
+    table = []
+    for method in methods:
+        views = len({(r.camera, r.frame_index, r.seed) for r in rows if r.method == method})
+        cells = [
+            Cell(
+                label_of(metric).text(means[method, metric]),
+                _is_best(means[method, metric], [means[m, metric] for m in methods], metric),
+            )
+            for metric in metrics
+        ]
+        table.append(CameraRow(title, method, views, cells))
+    return table
+
+
+def _is_best(value: float, all_values: list[float], metric: str) -> bool:
+    known = [other for other in all_values if not np.isnan(other)]
+    if len(known) < 2:
+        return False
+    return value == (max(known) if label_of(metric).higher_is_better else min(known))
+
+
+def _values(rows: Iterable[ScoreRow], method: str, metric: str) -> list[float]:
+    return [row.value for row in rows if row.method == method and row.metric == metric]
+
+
+def _ordered(metrics: set[str]) -> list[str]:
+    known = [metric for metric in VIEW_METRICS if metric in metrics]
+    return known + sorted(metrics - set(known))
