@@ -27,6 +27,7 @@ def extract_clip(work: Stage, recording: Source, capture: CaptureConfig) -> Summ
         "first_frame": int(clip.frame_indices[0]),
         "last_frame": int(clip.frame_indices[-1]),
         "fps": clip.fps,
+        "source_fps": scene.description.fps,
         "up": scene.up.tolist(),
         "camera": {"name": clip.camera.name, **clip.camera.to_json()},
     }

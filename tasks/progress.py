@@ -1,8 +1,7 @@
-"""How far a stage is: a bar with the remaining time in a terminal, an artifact in Prefect."""
+"""How far a stage is: a bar in a terminal, an artifact in Prefect."""
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,11 +9,8 @@ from uuid import UUID
 
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import TaskRunContext
-from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
 
-Progress = Callable[[float, str], None]
+from tasks.terminal_bar import Progress, terminal_bar
 
 # Each update is an event that Prefect keeps for days.
 SECONDS_BETWEEN_UPDATES = 5.0
@@ -27,21 +23,12 @@ def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Prog
     ``note_time`` is called now and then, so that a killed stage knows what it has cost.
     """
     artifact = ProgressArtifact(stage) if TaskRunContext.get() else None
-    with Bar(
-        TextColumn("{task.description:<18}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[text]}"),
-        console=Console(stderr=True),
-        disable=not sys.stderr.isatty(),
-    ) as bar:
-        row = bar.add_task(stage, total=1.0, text="")
-        updated = time.monotonic()
+    updated = time.monotonic()
+    with terminal_bar(stage) as show:
 
         def report(fraction: float, text: str) -> None:
             nonlocal updated
-            bar.update(row, completed=fraction, text=text)
+            show(fraction, text)
             if time.monotonic() - updated >= SECONDS_BETWEEN_UPDATES:
                 updated = time.monotonic()
                 note_time()
@@ -49,7 +36,6 @@ def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Prog
                     artifact.update(fraction, text)
 
         yield report
-        bar.update(row, completed=1.0, text="")
 
 
 class ProgressArtifact:

@@ -31,6 +31,13 @@ Body = Callable[Concatenate["Stage", Inputs], Summary]
 
 
 @dataclass(frozen=True)
+class Aside:
+    """Facts that a stage passes on to people and that decide nothing: they stay out of the key."""
+
+    values: Mapping[str, JsonValue]
+
+
+@dataclass(frozen=True)
 class Stage:
     """What the body of a stage works with: a folder to fill and a way to open its inputs."""
 
@@ -51,7 +58,8 @@ class Stage:
 class CachedStage(Generic[Inputs, Kind]):
     """A body that fills a folder, called with the store that the folder belongs to.
 
-    Every argument counts in the key: artifacts and sources by content, the rest by value. With
+    Every argument counts in the key: artifacts and sources by content, the rest by value, but
+    an ``Aside`` not at all. With
     ``resumes`` the folder of a killed try is handed to the next one.
     """
 
@@ -112,6 +120,6 @@ def _by_content(arguments: Mapping[str, Any]) -> tuple[dict[str, str], dict[str,
             inputs[name] = value.digest
         elif isinstance(value, ConfigurationPart):
             values[name] = value.model_dump(mode="json")
-        else:
+        elif not isinstance(value, Aside):
             values[name] = value
     return inputs, values

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from mocoflow_core.artifacts import Artifact
-from mocoflow_core.training.clock import Seconds
+from tasks.stage import Aside
 
 
-def spent_on(*artifacts: Artifact) -> Seconds:
-    """Seconds of the given stages, each counted once, as recorded when they were computed."""
-    once = {(artifact.stage, artifact.key): artifact for artifact in artifacts}
-    return sum((Seconds(a.wall_s, a.cpu_s) for a in once.values()), Seconds())
+def spent_on(*artifacts: Artifact) -> Aside:
+    """Seconds of the given stages, each counted once, as recorded when they were computed.
+
+    They stay out of the key: a slower machine does not make another scene.
+    """
+    once = {(artifact.stage, artifact.key): artifact for artifact in artifacts}.values()
+    return Aside({"wall_s": sum(a.wall_s for a in once), "cpu_s": sum(a.cpu_s for a in once)})

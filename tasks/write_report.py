@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 
-from pydantic import JsonValue
-
 from mocoflow_core.artifacts import (
     ClipArtifact,
     EvaluationArtifact,
@@ -17,7 +15,7 @@ from mocoflow_core.artifacts import (
 )
 from mocoflow_core.report.inputs import ReportInputs
 from mocoflow_core.report.page import write_report as write
-from tasks.stage import Stage, Summary, stage
+from tasks.stage import Aside, Stage, Summary, stage
 
 ALGORITHM_VERSION = 1  # First version.
 
@@ -25,7 +23,7 @@ ALGORITHM_VERSION = 1  # First version.
 @stage(ReportArtifact, ALGORITHM_VERSION)
 def write_report(
     work: Stage,
-    run: dict[str, JsonValue],
+    run: Aside,
     clip: ClipArtifact,
     evaluation: EvaluationArtifact,
     plan: PlanArtifact,
@@ -39,7 +37,7 @@ def write_report(
     """
     rendered = work.open(views)
     inputs = ReportInputs(
-        run=run,
+        run=run.values,
         decisions=json.loads((work.open(plan) / "plan.json").read_text())["decisions"],
         scores=work.open(scores) / "scores.parquet",
         curve=work.open(scores) / "error_curve.parquet",
@@ -50,7 +48,7 @@ def write_report(
         novel_camera=str(views.summary["side_view"]),
         novel_view=rendered / "side",
         turntable=rendered / "turntable.mp4",
-        warnings=[str(warning) for warning in run["warnings"]],
+        warnings=[str(warning) for warning in run.values["warnings"]],
         guard_events=[str(event) for event in trained.summary["events"]],
     )
     write(inputs, work.folder / "report.html")

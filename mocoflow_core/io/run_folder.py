@@ -43,6 +43,8 @@ class RunRecord(BaseModel):
     store: str
     machine: dict[str, JsonValue] = {}
     stages: tuple[StageRecord, ...] = ()
+    train_camera: str = ""
+    capture: dict[str, JsonValue] = {}
     cameras: dict[str, JsonValue] = {}
     scores: dict[str, JsonValue] = {}
     warnings: tuple[str, ...] = ()

@@ -1,0 +1,152 @@
+"""The command line. Heavy imports wait until a command needs them, so that help is instant."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flows.prefect_settings import set_environment, without_heartbeat
+from mocoflow_core.errors import InputError
+
+app = typer.Typer(
+    help="A moving person, filmed by one fixed camera, seen from any side at any time.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+DEMO_SCENE = "turn"
+
+
+def main() -> None:
+    """Exit codes: 0 done, 2 bad input with a one-line reason, 1 failure."""
+    try:
+        app()
+    except InputError as error:
+        typer.echo("mocoflow: " + " ".join(str(error).split()), err=True)
+        sys.exit(2)
+
+
+@app.command()
+def reconstruct(
+    scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
+    out: Annotated[Path | None, typer.Option(help="New folder for the results.")] = None,
+    preset: Annotated[str, typer.Option(help="fast or toy.")] = "fast",
+    meshes: Annotated[Path | None, typer.Option(help="Body meshes to use instead.")] = None,
+    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    budget: Annotated[
+        float | None, typer.Option(help="Seconds of the training clock.", min=1.0)
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
+    ] = None,
+    store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+) -> None:
+    """Reconstruct a scene: train, render, score, report."""
+    from flows.request import Request
+
+    request = Request(
+        scene_path=scene,
+        out=out or Path(f"{scene.resolve().name}-reconstructed"),
+        preset=preset,
+        meshes=meshes,
+        seed=seed,
+        budget_s=budget,
+        settings=tuple(settings or ()),
+        store_url=store,
+    )
+    if request.claim().is_finished():
+        typer.echo(f"Already finished: {request.out / 'report.html'}")
+        return
+    set_environment()
+    from flows.reconstruct import reconstruct as flow
+
+    with without_heartbeat():
+        flow(
+            scene=scene,
+            out=request.out,
+            preset=preset,
+            meshes=meshes,
+            seed=seed,
+            budget_s=budget,
+            settings=request.settings,
+            store=store,
+        )
+    typer.echo(f"Report: {request.out / 'report.html'}")
+
+
+@app.command()
+def render(
+    run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
+    out: Annotated[Path, typer.Option(help="An .mp4, one .png, or a folder of pictures.")],
+    camera: Annotated[str, typer.Option(help="Name of a camera of the run, or orbit.")] = "orbit",
+    frames: Annotated[str, typer.Option(help="Source numbers: 0,5,10-20.")] = "",
+    times: Annotated[str, typer.Option(help="Seconds from the first frame: 0.1,0.25.")] = "",
+    fps: Annotated[
+        float | None, typer.Option(help="Pictures per second of the whole clip.", min=0.1)
+    ] = None,
+    background: Annotated[str, typer.Option(help="A colour or a picture.")] = "white",
+    rotate: Annotated[
+        str, typer.Option(help="Turns the person: X,Y,Z, world axis times radians.")
+    ] = "",
+    size: Annotated[int | None, typer.Option(help="Longer side in pixels.", min=16)] = None,
+) -> None:
+    """Render views of a finished run; the same command gives the same pictures."""
+    from flows.request import open_users_store
+    from flows.written_lists import read_numbers, read_ranges, read_vector
+    from mocoflow_core.artifacts import SceneArtifact
+    from mocoflow_core.io.run_folder import read_run
+    from mocoflow_core.methods.novel_views import ViewRequest, render_novel_views
+    from tasks.terminal_bar import terminal_bar
+
+    request = ViewRequest(
+        camera=camera,
+        frames=read_ranges(frames),
+        times_s=read_numbers(times),
+        fps=fps,
+        background=background,
+        rotate=read_vector(rotate),
+        longer_side_px=size,
+    )
+    record = read_run(run)
+    store = open_users_store(record.store)
+    trained = store.find(SceneArtifact, record.stage(SceneArtifact.stage).key)
+    if trained is None:
+        raise InputError(
+            f"The trained scene of {run} must be in {record.store}",
+            "nothing intact there",
+            "Run `mocoflow reconstruct` again with the same folder.",
+        )
+    with terminal_bar("render") as progress:
+        count = render_novel_views(record, store.folder(trained), request, out, progress)
+    typer.echo(f"{count} views: {out}")
+
+
+@app.command()
+def synth(
+    name: Annotated[str, typer.Argument(help="turn, walk, dance, spin or still; see the README.")],
+    out: Annotated[Path, typer.Option(help="New folder for the scene.")],
+) -> None:
+    """Make a synthetic scene with exact truth."""
+    from mocoflow_core.synthetic.catalogue import named_scene
+    from mocoflow_core.synthetic.scene_writer import write_scene
+    from tasks.terminal_bar import terminal_bar
+
+    with terminal_bar(f"synth {name}") as progress:
+        write_scene(named_scene(name), out, progress)
+    typer.echo(f"Scene: {out}")
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="New folder for the results.")] = Path("demo"),
+    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+) -> None:
+    """Reconstruct a synthetic scene, made at first use."""
+    from flows.demo_scene import demo_scene
+
+    reconstruct(scene=demo_scene(DEMO_SCENE), out=out, seed=seed)

@@ -1,0 +1,26 @@
+"""The embedded scene: generated at first use, kept in the user's cache."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import mkdtemp
+
+from flows.user_folders import cache_folder
+from mocoflow_core.io.content_key import digest_document
+from mocoflow_core.synthetic.catalogue import named_scene
+from mocoflow_core.synthetic.scene_writer import write_scene
+from tasks.terminal_bar import terminal_bar
+
+
+def demo_scene(name: str) -> Path:
+    """The folder of a named synthetic scene; it appears complete or not at all."""
+    configuration = named_scene(name)
+    digest = digest_document(configuration.model_dump(mode="json"))
+    folder = cache_folder() / "scenes" / f"{name}-{digest[:12]}"
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(mkdtemp(prefix=f"{name}-", dir=folder.parent))
+        with terminal_bar(f"synth {name}") as progress:
+            write_scene(configuration, beside, progress)
+        beside.rename(folder)
+    return folder

@@ -1,0 +1,115 @@
+"""Flow mocoflow: a scene folder goes in, a trained scene with scores and a report comes out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from prefect import flow
+
+from flows.request import Request
+from flows.run_facts import describe_run, records, show_in_prefect
+from mocoflow_core.io.run_folder import RunRecord
+from tasks.extract_clip import extract_clip
+from tasks.extract_evaluation import extract_evaluation
+from tasks.fit_motion import fit_motion
+from tasks.ingest_meshes import ingest_meshes
+from tasks.inspect_scene import inspect_scene
+from tasks.locate_body import locate_body
+from tasks.optimise_scene import optimise_scene
+from tasks.plan_scene import plan_scene
+from tasks.pretrain_density import pretrain_density
+from tasks.render_views import render_views
+from tasks.score_views import score_views
+from tasks.stage import Aside
+from tasks.training_clock import spent_on
+from tasks.write_report import write_report
+
+
+@flow(name="mocoflow", validate_parameters=True)
+def reconstruct(
+    scene: Path,
+    out: Path,
+    preset: Literal["fast", "toy"] = "fast",
+    meshes: Path | None = None,
+    seed: int = 0,
+    budget_s: float | None = None,
+    settings: tuple[str, ...] = (),
+    store: str | None = None,
+) -> RunRecord:
+    """Reconstruct the person of a scene folder and say how well it went.
+
+    Args:
+        scene: folder with a scene.json.
+        out: new or empty folder, or one of the same request, for what the user keeps.
+        preset: complete configuration to start from.
+        meshes: body meshes to use instead of the scene's own.
+        seed: of everything random.
+        budget_s: seconds of the training clock.
+        settings: single fields, such as ``schedule.fine_steps=200``.
+        store: folder or fsspec address of the artifact store.
+    """
+    request = Request(
+        scene_path=scene,
+        out=out,
+        preset=preset,
+        meshes=meshes,
+        seed=seed,
+        budget_s=budget_s,
+        settings=settings,
+        store_url=store,
+    )
+    folder = request.claim()
+    where, chosen = request.store, request.configuration
+
+    clip = extract_clip(where, request.recording, chosen.capture)
+    given = ingest_meshes(where, request.recording, request.bodies)
+    inspection = inspect_scene(where, request.recording, given, chosen.plan)
+    bodies = given
+    if inspection.holds("location_search"):
+        bodies = locate_body(where, clip, given, chosen.location)
+    plan = plan_scene(where, clip, bodies, inspection, chosen.plan)
+    density = pretrain_density(where, bodies, plan, chosen.density)
+    motion = fit_motion(where, clip, bodies, plan, density, chosen.motion)
+    trained = optimise_scene(
+        where,
+        clip,
+        plan,
+        density,
+        motion,
+        spent_on(clip, given, inspection, bodies, plan, density, motion),
+        chosen.canonical,
+        chosen.motion,
+        chosen.sampling,
+        chosen.losses,
+        chosen.schedule,
+        seed,
+    )
+
+    evaluation = extract_evaluation(where, request.others, clip, chosen.capture)
+    views = render_views(
+        where, trained, clip, evaluation, bodies, chosen.evaluation, chosen.presentation
+    )
+    name = request.scene.description.name
+    scores = score_views(
+        where, name, seed, views, trained, clip, evaluation, bodies, chosen.evaluation, chosen.truth
+    )
+
+    stages = (clip, given, inspection, bodies, plan, density, motion, trained)
+    facts = describe_run(clip, evaluation, trained, scores, stages)
+    about = Aside(folder.begun.model_copy(update=facts).model_dump(mode="json"))
+    report = write_report(where, about, clip, evaluation, plan, trained, views, scores)
+
+    rendered = where.folder(views)
+    folder.take(where.folder(plan) / "plan.json", "plan.json")
+    folder.take(where.folder(scores) / "scores.parquet", "scores.parquet")
+    folder.take(where.folder(scores) / "error_curve.parquet", "error_curve.parquet")
+    folder.take(where.folder(report) / "report.html", "report.html")
+    folder.take(rendered / "turntable.mp4", "turntable.mp4")
+    folder.take(rendered / "mocoflow" / "views", "views")
+    folder.take(rendered / "mocoflow" / "opacity", "opacity")
+    record = folder.finish(
+        {**facts, "stages": records((*stages, evaluation, views, scores, report))}
+    )
+    show_in_prefect(record)
+    return record

@@ -1,0 +1,99 @@
+"""What a user asked for, resolved: scene, configuration, store."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+from flows.user_folders import cache_folder
+from mocoflow_core.capture.scene import Scene, open_scene
+from mocoflow_core.errors import InputError
+from mocoflow_core.io.content_key import key_of
+from mocoflow_core.io.remote_store import open_store
+from mocoflow_core.io.run_folder import RunFolder, RunRecord
+from mocoflow_core.io.store import Store
+from mocoflow_core.presets import PRESETS, Configuration
+from mocoflow_core.settings import with_settings
+from tasks.source import Source, clip_source, evaluation_source, meshes_source
+
+# Counts up when a finished folder of an earlier version must not be taken for a finished one.
+REQUEST_VERSION = 1
+
+
+def open_users_store(url: str | None) -> Store:
+    """The store at an address, or the one in the user's cache."""
+    return open_store(url or str(cache_folder() / "store"), cache_folder() / "mirrors")
+
+
+class Request(BaseModel):
+    """The parameters of a reconstruction; the flow and the command line share them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    scene_path: Path
+    out: Path
+    preset: str = "fast"
+    meshes: Path | None = None
+    seed: int = 0
+    budget_s: float | None = None
+    settings: tuple[str, ...] = ()
+    store_url: str | None = None
+
+    @cached_property
+    def scene(self) -> Scene:
+        return open_scene(self.scene_path)
+
+    @cached_property
+    def configuration(self) -> Configuration:
+        """The preset with the settings and the budget applied."""
+        if self.preset not in PRESETS:
+            raise InputError(
+                f"--preset must be one of {', '.join(PRESETS)}", repr(self.preset), "Choose one."
+            )
+        budget = () if self.budget_s is None else (f"schedule.budget_s={self.budget_s}",)
+        return with_settings(PRESETS[self.preset](), (*self.settings, *budget))
+
+    @cached_property
+    def store(self) -> Store:
+        return open_users_store(self.store_url)
+
+    @cached_property
+    def recording(self) -> Source:
+        """The train camera's files."""
+        return clip_source(self.scene)
+
+    @cached_property
+    def bodies(self) -> Source | None:
+        """The body meshes' file."""
+        if self.meshes and not self.meshes.is_file():
+            raise InputError("--meshes must be a file", str(self.meshes), "Check the path.")
+        return meshes_source(self.scene, self.meshes)
+
+    @cached_property
+    def others(self) -> Source:
+        """The evaluation cameras' files and the truth."""
+        return evaluation_source(self.scene)
+
+    def claim(self) -> RunFolder:
+        """Take the output folder. Raises InputError when it holds anything else."""
+        begun = RunRecord(
+            request=self._key(),
+            scene=self.scene.description.name,
+            scene_path=str(self.scene.root.resolve()),
+            preset=self.preset,
+            seed=self.seed,
+            configuration=self.configuration.model_dump(mode="json"),
+            store=self.store.url,
+        )
+        return RunFolder.claim(self.out, begun)
+
+    def _key(self) -> str:
+        inputs = {
+            "recording": self.recording.digest,
+            "bodies": self.bodies.digest if self.bodies else "",
+            "others": self.others.digest,
+        }
+        values = {"configuration": self.configuration.model_dump(mode="json"), "seed": self.seed}
+        return key_of("reconstruct", REQUEST_VERSION, inputs, values)

@@ -1,0 +1,76 @@
+"""What a run says about itself: for run.json, for the report and for Prefect's pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from prefect.artifacts import create_markdown_artifact, create_table_artifact
+
+from mocoflow_core.artifacts import (
+    Artifact,
+    ClipArtifact,
+    EvaluationArtifact,
+    SceneArtifact,
+    ScoresArtifact,
+)
+from mocoflow_core.io.machine import describe_machine
+from mocoflow_core.io.run_folder import RunRecord, StageRecord
+
+# What rendering the run again needs to know of its clip.
+CAPTURE = ("fps", "source_fps", "first_frame", "last_frame", "up")
+
+
+def describe_run(
+    clip: ClipArtifact,
+    evaluation: EvaluationArtifact,
+    trained: SceneArtifact,
+    scores: ScoresArtifact,
+    stages: Iterable[Artifact],
+) -> dict[str, Any]:
+    """The fields of ``run.json`` that are known once all is scored."""
+    stages = tuple(stages)
+    camera = {**clip.summary["camera"]}
+    train_camera = camera.pop("name")
+    return {
+        "machine": {**describe_machine(), "threads": trained.summary["threads"]},
+        "train_camera": train_camera,
+        "capture": {
+            name: clip.summary[name] for name in ("fps", "first_frame", "last_frame", "up")
+        },
+        "cameras": {train_camera: camera, **evaluation.summary["cameras"]},
+        "stages": records(stages),
+        "scores": scores.summary["mean"],
+        "warnings": tuple(dict.fromkeys(w for stage in stages for w in stage.warnings)),
+    }
+
+
+def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
+    """Each stage once, with its cost and whether it was found in the store."""
+    once = {stage.key: stage for stage in stages}
+    return tuple(
+        StageRecord(
+            name=stage.stage,
+            key=stage.key,
+            wall_s=stage.wall_s,
+            cpu_s=stage.cpu_s,
+            cached=stage.cached,
+        )
+        for stage in once.values()
+    )
+
+
+def show_in_prefect(record: RunRecord) -> None:
+    """The scores as a table, and where the report lies."""
+    rows = [
+        {"method": method, "camera": camera, **metrics}
+        for method, cameras in record.scores.items()
+        for camera, metrics in cameras.items()
+    ]
+    create_table_artifact(rows, key="scores", description=f"Mean scores of {record.scene}")
+    lines = [f"# {record.scene}", "", "| stage | seconds | CPU seconds | cached |", "|-|-|-|-|"]
+    lines += [
+        f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'yes' if s.cached else ''} |"
+        for s in record.stages
+    ]
+    create_markdown_artifact("\n".join(lines), key="report", description="Stages of the run")

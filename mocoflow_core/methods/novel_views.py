@@ -1,0 +1,162 @@
+"""Any view of a finished run: any camera, any time, any background, as pictures or a video."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageColor
+from pydantic import BaseModel, ConfigDict
+
+from mocoflow_core.errors import InputError
+from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.geometry.orbit import moved_around
+from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
+from mocoflow_core.io.run_folder import RunRecord
+from mocoflow_core.io.video import write_video
+from mocoflow_core.methods.presentation import body_centre, orbit
+from mocoflow_core.methods.rendered_views import Progress
+from mocoflow_core.rendering.trained_scene import TrainedScene
+
+ORBIT = "orbit"
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
+
+
+class ViewRequest(BaseModel):
+    """Which views are wanted. Without frames, times or fps: every working frame."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    camera: str
+    frames: tuple[int, ...] = ()  # source numbers
+    times_s: tuple[float, ...] = ()  # seconds since the clip's first frame
+    fps: float | None = None
+    background: str = "white"  # a colour's name or code, or a picture's path
+    rotate: tuple[float, float, float] | None = None  # world axis times radians, of the person
+    longer_side_px: int | None = None
+
+
+class Shot(NamedTuple):
+    """One picture to take; ``number`` names its file."""
+
+    number: int
+    time: float  # normalised
+    camera: Camera
+
+
+def render_novel_views(
+    run: RunRecord, trained: Path, request: ViewRequest, out: Path, progress: Progress
+) -> int:
+    """Write a video, one PNG, or a folder of ``%06d.png``; give the number of pictures.
+
+    Frames are named by their source number, other times by their position. Raises InputError for
+    an unknown camera, a time outside the clip, or a background that is neither colour nor picture.
+    """
+    scene = TrainedScene.open(trained)
+    shots = _shots(run, scene, request)
+    pictures = _pictures(scene, shots, _background(request.background, shots[0].camera), progress)
+    if out.suffix.lower() in VIDEO_SUFFIXES:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_video(out, (picture for _, picture in pictures), request.fps or _clip(run)["fps"])
+    elif out.suffix.lower() == ".png":
+        if len(shots) > 1:
+            raise InputError(
+                "One .png holds one view", f"{len(shots)} views", "Give a folder or an .mp4."
+            )
+        write_picture(out, next(pictures)[1])
+    else:
+        for shot, picture in pictures:
+            write_picture(out / f"{shot.number:06d}.png", picture)
+    return len(shots)
+
+
+def _pictures(
+    scene: TrainedScene, shots: list[Shot], background: NDArray[np.float32], progress: Progress
+) -> Iterator[tuple[Shot, NDArray[np.uint8]]]:
+    for done, shot in enumerate(shots):
+        rgb, _ = scene.render(shot.camera, shot.time, background)
+        progress((done + 1) / len(shots), f"view {done + 1} of {len(shots)}")
+        yield shot, as_bytes(rgb)
+
+
+def _shots(run: RunRecord, scene: TrainedScene, request: ViewRequest) -> list[Shot]:
+    moments = _moments(run, request)
+    times = np.array([time for _, time in moments])
+    if request.camera == ORBIT:
+        first = _camera(run, run.train_camera, request.longer_side_px)
+        cameras = list(orbit(scene, first, _up(run), times))
+    else:
+        cameras = [_camera(run, request.camera, request.longer_side_px)] * len(moments)
+    if request.rotate is not None:
+        # Turning the person is moving the camera the other way round the person.
+        turn = -np.array(request.rotate)
+        cameras = [
+            moved_around(camera, turn, body_centre(scene, time))
+            for camera, time in zip(cameras, times, strict=True)
+        ]
+    return [
+        Shot(number, time, camera) for (number, time), camera in zip(moments, cameras, strict=True)
+    ]
+
+
+def _moments(run: RunRecord, request: ViewRequest) -> list[tuple[int, float]]:
+    """Numbers for the files, and normalised times."""
+    clip = _clip(run)
+    first, last, source_fps = clip["first_frame"], clip["last_frame"], clip["source_fps"]
+    duration_s = (last - first) / source_fps
+    if request.times_s:
+        found = [(number, s / max(duration_s, 1e-9)) for number, s in enumerate(request.times_s)]
+    elif request.frames or request.fps is None:
+        step = max(round(source_fps / clip["fps"]), 1)
+        frames = request.frames or tuple(range(int(first), int(last) + 1, step))
+        found = [(frame, (frame - first) / max(last - first, 1)) for frame in frames]
+    else:
+        count = int(duration_s * request.fps) + 1
+        found = [(number, number / request.fps / max(duration_s, 1e-9)) for number in range(count)]
+    outside = [time for _, time in found if not -1e-9 <= time <= 1.0 + 1e-9]
+    if outside:
+        raise InputError(
+            f"Times must lie in the clip: frames {first:g} to {last:g}, 0 to {duration_s:g} s",
+            f"{first + outside[0] * (last - first):g} as a frame",
+            "Choose times inside.",
+        )
+    return found
+
+
+def _camera(run: RunRecord, name: str, longer_side_px: int | None) -> Camera:
+    values = run.cameras.get(name)
+    if not isinstance(values, dict):
+        known = ", ".join([ORBIT, *run.cameras])
+        raise InputError(f"--camera must be one of {known}", repr(name), "Choose one.")
+    camera = Camera.from_json(name, values)  # type: ignore[arg-type]
+    if longer_side_px is None:
+        return camera
+    scale = longer_side_px / max(camera.width, camera.height)
+    return camera.resized(round(scale * camera.width), round(scale * camera.height))
+
+
+def _background(name: str, camera: Camera) -> NDArray[np.float32]:
+    """(H, W, 3) in [0, 1]; a picture is resized to the camera."""
+    size = (camera.height, camera.width, 3)
+    if Path(name).is_file():
+        picture = Image.fromarray(read_picture(Path(name))).convert("RGB")
+        return np.asarray(picture.resize((camera.width, camera.height)), np.float32) / 255.0
+    try:
+        colour = ImageColor.getrgb(name)[:3]
+    except ValueError as error:
+        raise InputError(
+            "--background must be a colour or a picture", repr(name), "Try white or #204060."
+        ) from error
+    return np.broadcast_to(np.asarray(colour, np.float32) / 255.0, size).copy()
+
+
+def _clip(run: RunRecord) -> dict[str, float]:
+    names = ("fps", "source_fps", "first_frame", "last_frame")
+    return {name: float(run.capture[name]) for name in names}  # type: ignore[arg-type]
+
+
+def _up(run: RunRecord) -> NDArray[np.float64]:
+    return np.asarray(run.capture["up"], np.float64)

@@ -1,0 +1,86 @@
+"""Stage optimise_scene: all fields together, coarse to fine, against the train camera."""
+
+from __future__ import annotations
+
+from mocoflow_core.artifacts import (
+    ClipArtifact,
+    DensityArtifact,
+    MotionArtifact,
+    PlanArtifact,
+    SceneArtifact,
+)
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.fields.canonical_density import CanonicalDensity
+from mocoflow_core.fields.canonical_grid import CanonicalConfig
+from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
+from mocoflow_core.losses.weights import LossConfig
+from mocoflow_core.planning.plan import ScenePlan
+from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.training import optimise_scene as training
+from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.fit_motion import MotionStart
+from mocoflow_core.training.optimise_scene import Learned
+from mocoflow_core.training.schedule import ScheduleConfig
+from tasks.stage import Aside, Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(SceneArtifact, ALGORITHM_VERSION, resumes=True)
+def optimise_scene(
+    work: Stage,
+    clip: ClipArtifact,
+    plan: PlanArtifact,
+    density: DensityArtifact,
+    motion: MotionArtifact,
+    before: Aside,
+    canonical: CanonicalConfig,
+    moving: MotionConfig,
+    sampling: SamplingConfig,
+    losses: LossConfig,
+    schedule: ScheduleConfig,
+    seed: int,
+) -> Summary:
+    """Third stage of the optimisation (MoCo-Flow sec. 3.4), resumed where a killed try left it.
+
+    Output: ``model.safetensors`` with what is needed to open it, ``snapshots/``, ``result.json``.
+    Nearly all of a run's time.
+    """
+    seen = Clip.load(work.open(clip))
+    decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
+    spent = Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
+    result = training.optimise_scene(
+        seen,
+        CanonicalDensity.load(work.open(density)),
+        MotionStart.load(work.open(motion)),
+        SceneShape(
+            canonical=canonical,
+            motion=moving,
+            times=tuple(seen.times[~seen.held_out].tolist()),
+            shell_width_m=decided.shell_width_m,
+            inner_depth_m=sampling.inner_depth_m,
+            step_m=sampling.step_m,
+            light=True,
+        ),
+        Learned(
+            motion_residual=decided.needs("motion_residual"),
+            consensus=decided.needs("motion_consensus"),
+            appearance_codes=decided.needs("appearance_codes"),
+        ),
+        losses,
+        sampling,
+        schedule,
+        seed,
+        spent,
+        work.folder,
+        work.progress,
+    )
+    return {
+        "steps": result.steps,
+        "threads": result.threads,
+        "tries": result.tries,
+        "events": [str(event) for event in result.events],
+        "losses": result.losses,
+        "before_wall_s": spent.wall,
+        "before_cpu_s": spent.cpu,
+    }
