@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mocoflow_core.body.mesh_checks import (
     require_finite,
     require_frames,
+    require_in_front,
     require_metres,
     require_shapes,
 )
@@ -80,13 +81,17 @@ def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> Ingested
     faces, face_warnings = _proper_faces(raw)
     joined, gap_warnings = _joined(replace(raw, faces=faces), expected)
     root_centred = description.coordinates == "camera-root-centred"
+    located = description.located and not root_centred
+    camera = scene.cameras[scene.train_camera]
     if description.coordinates == "camera":
-        world = scene.cameras[scene.train_camera].to_world(joined.vertices.astype(np.float64))
+        world = camera.to_world(joined.vertices.astype(np.float64))
         joined = replace(joined, vertices=world.astype(np.float32))
+    if located:
+        require_in_front(joined, camera)
     return IngestedMeshes(
         joined,
         "camera-root-centred" if root_centred else "world",
-        description.located and not root_centred,
+        located,
         face_warnings + gap_warnings,
     )
 

@@ -116,7 +116,7 @@ def locate_body(
     found = np.full((len(posed), 3), np.nan)
     residual = np.full(len(posed), np.nan)
     confidence = np.zeros(len(posed))
-    for done, position in enumerate(searched):
+    for done, position in enumerate(searched.tolist()):
         row = rows[int(clip.frame_indices[position])]
         placement = _place(clip, position, posed[row], ingested, configuration)
         found[row] = centres[row] + placement.translation

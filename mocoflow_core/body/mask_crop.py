@@ -14,6 +14,8 @@ from mocoflow_core.geometry.camera import Camera
 Array = NDArray[np.float64]
 # Nothing is drawn nearer to the camera than this.
 NEAR_M = 0.05
+# In pixels of the crop: about what the area of a pixel averages over.
+BLUR_PX = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +63,13 @@ def _resampled(
     """Coverage of the crop's pixels. Shrinking blurs first, so that none of the mask is lost."""
     image = mask.astype(np.float32)
     if scale < 1:
-        image = cv2.GaussianBlur(image, (0, 0), 0.4 / scale)
+        image = cv2.GaussianBlur(image, (0, 0), BLUR_PX / scale).astype(np.float32)
     # cv2 has pixel centres at integers.
     half = np.array([0.5, 0.5])
     shifted = to_crop.copy()
     shifted[:, 2] += to_crop[:, :2] @ half - half
-    return cv2.warpAffine(image, shifted, (side_px, side_px), flags=cv2.INTER_LINEAR)
+    crop = cv2.warpAffine(image, shifted, (side_px, side_px), flags=cv2.INTER_LINEAR)
+    return crop.astype(np.float32, copy=False)
 
 
 def facing(points_camera: Array, faces: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.errors import InputError
+from mocoflow_core.geometry.camera import Camera
 
 # A person measures between these in metres, child or adult, crouched or stretched; a file in
 # another unit is off by ten or more and falls outside.
@@ -20,6 +21,8 @@ UNIT_SIZES_M = {
     "kilometres": 1000.0,
 }
 TYPICAL_SIZE_M = 1.7
+# Nobody is filmed from nearer or farther; ten times that is a matter of units.
+PLAUSIBLE_DISTANCE_M = (0.1, 150.0)
 # Longer gaps are not bridged: a limb can turn round in the meantime.
 LONGEST_GAP_S = 0.25
 
@@ -102,6 +105,26 @@ def require_frames(meshes: MeshSequence, expected: NDArray[np.int32], fps: float
             f"{counts}, none for frame {missing[0]}",
             action,
         )
+
+
+def require_in_front(meshes_world: MeshSequence, camera: Camera) -> None:
+    """Raise InputError when the body is behind the camera or absurdly far from it."""
+    depths = (meshes_world.vertices.mean(axis=1) @ camera.R.T + camera.t)[:, 2]
+    depth = float(np.median(depths))
+    low, high = PLAUSIBLE_DISTANCE_M
+    if low <= depth <= high:
+        return
+    if depth < low:
+        action = (
+            "Camera axes are OpenCV's: x right, y down, z forward; R and t take world to camera."
+        )
+    else:
+        action = f"Check the unit of t of {camera.name} and of the meshes: both are metres."
+    raise InputError(
+        f"the body must be {low} to {high:g} m in front of {camera.name}",
+        f"a depth of {depth:.4g} m",
+        action,
+    )
 
 
 def body_size(vertices: NDArray[np.floating]) -> float:

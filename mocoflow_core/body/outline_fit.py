@@ -38,13 +38,13 @@ def fit_outline(
     and say nothing of the distance. Returns the best translation met, ``start`` among them.
     """
     distance = signed_distance(crop.coverage > 0.5)
-    slopes = np.stack(np.gradient(distance)[::-1], axis=-1)
+    slope_x, slope_y = np.gradient(distance, axis=1), np.gradient(distance, axis=0)
     best, least = start, np.inf
     translation = start
     for _ in range(iterations + 1):
         rows, columns = np.nonzero(_outline(crop.draw(points + translation, faces)))
         off = distance[rows, columns].astype(np.float64)
-        slope = slopes[rows, columns].astype(np.float64)
+        slope = np.stack([slope_x[rows, columns], slope_y[rows, columns]], axis=-1)
         length = np.linalg.norm(slope, axis=-1)
         clear = np.isfinite(off) & (length > LEAST_GRADIENT)
         if clear.sum() < LEAST_POINTS:

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 Frames = NDArray[np.uint8]  # (T, H, W, 3)
 Masks = NDArray[np.bool_]  # (T, H, W), true on the person
+# Sorts behind every colour.
 _NEVER_SEEN = np.uint16(256)
+INPAINT_RADIUS_PX = 3
 
 
 def background_plate(frames: Frames, masks: Masks, margin_px: int) -> NDArray[np.uint8]:
@@ -25,7 +27,8 @@ def background_plate(frames: Frames, masks: Masks, margin_px: int) -> NDArray[np
         unseen &= still_unseen
     if not unseen.any():
         return plate
-    return cv2.inpaint(plate, unseen.astype(np.uint8), max(margin_px, 3), cv2.INPAINT_TELEA)
+    filled = cv2.inpaint(plate, unseen.astype(np.uint8), INPAINT_RADIUS_PX, cv2.INPAINT_TELEA)
+    return filled.astype(np.uint8, copy=False)
 
 
 def masks_from_plate(frames: Frames, plate: NDArray[np.uint8], threshold: int) -> Masks:

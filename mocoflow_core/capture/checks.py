@@ -14,6 +14,8 @@ from mocoflow_core.geometry.camera import Camera
 FOREGROUND_SHARE = (0.01, 0.6)
 # The method assumes a camera that stands still.
 LARGEST_BACKGROUND_MOTION_PX = 0.5
+# 59.94 and 60 are the same rate.
+RATE_TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,13 @@ def check_capture(clip: Clip, source: Camera) -> CaptureFindings:
             f"(limit {LARGEST_BACKGROUND_MOTION_PX} px): does the camera stand still?"
         )
     return CaptureFindings(share, empty, motion_px, tuple(warnings))
+
+
+def check_rate(stated_fps: float | None, scene_fps: float) -> tuple[str, ...]:
+    """Whether the video's own rate is the scene's; a wrong one makes motion too fast or slow."""
+    if stated_fps is None or abs(stated_fps / scene_fps - 1) <= RATE_TOLERANCE:
+        return ()
+    return (f"the video says {stated_fps:.4g} frames per second, scene.json {scene_fps:.4g}",)
 
 
 def _principal_point(camera: Camera) -> list[str]:

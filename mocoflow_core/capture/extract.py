@@ -54,7 +54,14 @@ def extract_clip(scene: Scene, configuration: CaptureConfig) -> Clip:
     neither masks nor a background plate.
     """
     selection = select_training_frames(scene, configuration)
-    return extract_camera(scene, scene.train_camera, selection, configuration)
+    clip = extract_camera(scene, scene.train_camera, selection, configuration)
+    if not clip.masks.any():
+        raise InputError(
+            f"{scene.train_camera} must show the person in a mask",
+            "empty masks only",
+            "Check the masks; the person is white.",
+        )
+    return clip
 
 
 def extract_evaluation(
@@ -94,8 +101,8 @@ def select_training_frames(scene: Scene, configuration: CaptureConfig) -> FrameS
         configuration.held_out_frames,
         configuration.holdout_every,
     )
-    unmasked = np.setdiff1d(selection.working, list(masks)) if masks else []
-    if len(unmasked):
+    unmasked = np.setdiff1d(selection.working, list(masks))
+    if masks and len(unmasked):
         raise InputError(
             f"{name} must have a mask for each frame",
             f"none for frame {unmasked[0]} ({len(unmasked)} missing)",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.video import describe_video, read_frames
+from mocoflow_core.io.video import VideoDescription, describe_video, read_frames
 
 Image = NDArray[np.uint8]  # (H, W, 3) sRGB-encoded
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -30,6 +30,10 @@ class FrameSource(Protocol):
     def files(self) -> list[Path]:
         """The files that hold them."""
 
+    @property
+    def fps(self) -> float | None:
+        """The rate that the files themselves state."""
+
     def read(self, wanted: Collection[int]) -> Iterator[tuple[int, Image]]:
         """The wanted frames one at a time, ascending."""
 
@@ -41,12 +45,20 @@ class VideoFrames:
     path: Path
 
     @cached_property
+    def _description(self) -> VideoDescription:
+        return describe_video(self.path)
+
+    @property
     def indices(self) -> NDArray[np.int32]:
-        return np.arange(describe_video(self.path).frame_count, dtype=np.int32)
+        return np.arange(self._description.frame_count, dtype=np.int32)
 
     @property
     def files(self) -> list[Path]:
         return [self.path]
+
+    @property
+    def fps(self) -> float | None:
+        return self._description.fps or None
 
     def read(self, wanted: Collection[int]) -> Iterator[tuple[int, Image]]:
         return read_frames(self.path, wanted)
@@ -65,6 +77,10 @@ class ImageFrames:
     @property
     def files(self) -> list[Path]:
         return [self.images[index] for index in sorted(self.images)]
+
+    @property
+    def fps(self) -> float | None:
+        return None
 
     def read(self, wanted: Collection[int]) -> Iterator[tuple[int, Image]]:
         for index in sorted(wanted):
@@ -125,7 +141,7 @@ def read_mask(path: Path) -> Image:
             f"values up to {highest} in {path.parent.name}/{path.name}",
             "Store masks with 0 and 255.",
         )
-    return mask
+    return mask.astype(np.uint8, copy=False)
 
 
 def _undecodable(path: Path) -> InputError:

@@ -36,11 +36,13 @@ class WorkingView:
     def image(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """A picture (H, W, 3) or a mask (H, W) of 0 to 255 at the working size."""
         if self._maps is not None:
-            picture = cv2.remap(picture, *self._maps, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
+            bent = cv2.remap(picture, *self._maps, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
+            picture = bent.astype(np.uint8, copy=False)
         if picture.shape[:2] == (self.camera.height, self.camera.width):
             return np.ascontiguousarray(picture)
         size = (self.camera.width, self.camera.height)
-        return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+        shrunk = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+        return shrunk.astype(np.uint8, copy=False)
 
     def mask(self, picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """A mask (H, W) of 0 to 255 at the working size: true where most of the area is."""
@@ -48,15 +50,15 @@ class WorkingView:
         return self.image(binary) > 127
 
     @cached_property
-    def _maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]] | None:
+    def _maps(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
         """For each undistorted pixel its place in the stored picture; none without distortion."""
         if self.source.is_pinhole:
             return None
         columns, rows = np.meshgrid(np.arange(self.source.width), np.arange(self.source.height))
-        pixels = np.stack([columns, rows], axis=-1) + _HALF_PIXEL
+        pixels = np.stack([columns, rows], axis=-1).astype(np.float64) + _HALF_PIXEL
         # cv2.remap has pixel centres at integers.
         places = (distort(pixels, self.source) - _HALF_PIXEL).astype(np.float32)
-        return cv2.convertMaps(places, None, cv2.CV_16SC2)
+        return places[..., 0].copy(), places[..., 1].copy()
 
 
 def distort(pixels: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:

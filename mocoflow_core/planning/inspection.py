@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mocoflow_core.body.body_checks import check_distance, check_height, check_overlap
 from mocoflow_core.body.ingest import IngestedMeshes
-from mocoflow_core.capture.checks import check_capture
+from mocoflow_core.capture.checks import check_capture, check_rate
 from mocoflow_core.capture.extract import (
     CaptureConfig,
     extract_camera,
@@ -64,10 +64,12 @@ def inspect_scene(
     selection = FrameSelection(looked_at, looked_at[:0], scene.description.fps)
     clip = extract_camera(scene, scene.train_camera, selection, capture)
     camera = scene.cameras[scene.train_camera]
+    frames = scene.frames(scene.train_camera)
     findings = check_capture(clip, camera)
+    rate_warnings = check_rate(frames.fps, scene.description.fps)
     motion_px = findings.background_motion_px
     inspection = Inspection(
-        frame_count=len(scene.frames(scene.train_camera).indices),
+        frame_count=len(frames.indices),
         source_fps=scene.description.fps,
         width=camera.width,
         height=camera.height,
@@ -77,7 +79,7 @@ def inspect_scene(
         located=meshes.located if meshes else None,
         foreground_share=findings.foreground_share,
         background_motion_px=motion_px if np.isfinite(motion_px) else None,
-        warnings=findings.warnings,
+        warnings=findings.warnings + rate_warnings,
     )
     if meshes is None:
         return inspection

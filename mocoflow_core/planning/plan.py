@@ -34,7 +34,7 @@ class PlanConfig(ConfigurationPart):
         0.5, ge=0, description="A body whose points move less than this, in pixels, is still."
     )
     consistent_px: float = Field(
-        1.0, ge=0, description="Outlines nearer than this, in pixels, leave nothing to correct."
+        1.5, ge=0, description="Outlines nearer than this, in pixels, leave nothing to correct."
     )
     constant_brightness: float = Field(
         0.02, ge=0, description="Brightness of the person that changes less than this is constant."

@@ -50,9 +50,9 @@ def test_neighbouring_triangles_leave_no_gap_between_them():
 def test_a_square_covers_its_own_area_wherever_it_is_in_the_image():
     square = np.array([[0, 0], [8, 0], [8, 8], [0, 8.0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    assert cover(square + [5.0, 7.0], faces, 40, 30).sum() == 64
-    assert cover(square + [5.3, 7.4], faces, 40, 30).sum() == 64
-    assert cover(square + [-4.0, 26.0], faces, 40, 30).sum() == 16
+    assert cover(square + np.array([5.0, 7.0]), faces, 40, 30).sum() == 64
+    assert cover(square + np.array([5.3, 7.4]), faces, 40, 30).sum() == 64
+    assert cover(square + np.array([-4.0, 26.0]), faces, 40, 30).sum() == 16
 
 
 def test_a_body_behind_the_camera_covers_nothing():

@@ -1,0 +1,152 @@
+"""The location search finds what was taken away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from mocoflow_core.body.ingest import IngestedMeshes
+from mocoflow_core.body.location import LocatedMeshes, LocationConfig, locate_body
+from mocoflow_core.body.silhouette import silhouettes
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.errors import InputError
+from tests.capsule_person import look_at, walking
+
+FRAMES = 10
+CAMERA = look_at([0.3, -3.0, 1.3], [0, 0, 0.9], 150, 128, 128)
+MESHES = walking(FRAMES)
+IN_CAMERA = CAMERA.to_camera(MESHES.vertices.astype(float))
+# The root is no vertex and no mean of vertices, as with real estimators.
+ROOTS = IN_CAMERA.mean(axis=1) + np.array([0.02, 0.1, 0.03])
+
+
+def clip_of(masks, held_out=()) -> Clip:
+    count = len(masks)
+    return Clip(
+        CAMERA,
+        12.0,
+        MESHES.frame_indices[:count],
+        np.zeros((count, 1, 1, 3), np.uint8),
+        masks,
+        np.ones(count, bool),
+        np.isin(np.arange(count), held_out),
+        np.zeros((1, 1, 3), np.uint8),
+    )
+
+
+def root_centred() -> IngestedMeshes:
+    vertices = (IN_CAMERA - ROOTS[:, None]).astype(np.float32)
+    return IngestedMeshes(replace(MESHES, vertices=vertices), "camera-root-centred", False)
+
+
+@pytest.fixture(scope="module")
+def masks():
+    return silhouettes(MESHES.vertices, MESHES.faces, CAMERA)
+
+
+def errors_m(located: LocatedMeshes):
+    """Lateral and depth errors (T,) each, metres."""
+    error = located.translations - ROOTS
+    return np.linalg.norm(error[:, :2], axis=1), np.abs(error[:, 2])
+
+
+def test_known_offsets_are_found(masks):
+    located = locate_body(clip_of(masks), root_centred(), LocationConfig())
+    lateral, depth = errors_m(located)
+    # A pixel is 2 cm here; the wanted accuracy is 2 cm and 5 cm.
+    assert np.median(lateral) < 0.007
+    assert np.median(depth) < 0.025
+    assert np.abs(located.meshes.vertices - MESHES.vertices).max() < 0.1
+    assert not located.warnings
+
+
+@pytest.mark.parametrize("shape", [cv2.MORPH_DILATE, cv2.MORPH_ERODE])
+def test_clothes_and_tight_masks_do_not_change_the_depth(masks, shape):
+    changed = np.stack(
+        [cv2.morphologyEx(mask.astype(np.uint8), shape, np.ones((3, 3))) > 0 for mask in masks]
+    )
+    lateral, depth = errors_m(locate_body(clip_of(changed), root_centred(), LocationConfig()))
+    # Growing by a pixel is 2 cm on all sides; matching areas would be off by 40 cm.
+    assert np.median(lateral) < 0.015
+    assert np.median(depth) < 0.05
+
+
+def test_frames_without_a_person_are_interpolated(masks):
+    gaps = masks.copy()
+    gaps[4:6] = False
+    located = locate_body(clip_of(gaps), root_centred(), LocationConfig())
+    lateral, depth = errors_m(located)
+    assert (located.confidence[4:6] == 0).all()
+    assert np.isnan(located.residual[4:6]).all()
+    assert lateral.max() < 0.05
+    assert depth.max() < 0.1
+
+
+def test_held_out_frames_are_not_looked_at(masks):
+    spoilt = masks.copy()
+    spoilt[3] = np.roll(spoilt[3], 40, axis=1)
+    untouched = locate_body(clip_of(masks, held_out=[3]), root_centred(), LocationConfig())
+    located = locate_body(clip_of(spoilt, held_out=[3]), root_centred(), LocationConfig())
+    assert np.array_equal(located.translations, untouched.translations)
+    assert errors_m(located)[0][3] < 0.05
+
+
+def test_masks_cut_by_the_border_count_little(masks):
+    cut = masks.copy()
+    cut[5, 60:] = False
+    cut[5] = np.roll(cut[5], 128 - 60, axis=0)
+    located = locate_body(clip_of(cut), root_centred(), LocationConfig())
+    assert located.confidence[5] < 0.05 * np.median(located.confidence)
+    assert errors_m(located)[0][5] < 0.1
+    assert "1 of 10 masks" in located.warnings[0]
+
+
+def test_a_clip_of_cut_masks_alone_is_still_located():
+    near = look_at([0.3, -3.0, 1.3], [0, 0, 0.9], 285, 128, 128)
+    masks = silhouettes(MESHES.vertices, MESHES.faces, near)
+    clip = replace(clip_of(masks), camera=near)
+    lateral, _ = errors_m(locate_body(clip, root_centred(), LocationConfig()))
+    assert np.median(lateral) < 0.3
+
+
+def test_what_is_given_is_where_the_search_starts(masks):
+    offset = np.array([0.15, -0.1, 0.4])
+    wrong = CAMERA.to_world(IN_CAMERA + offset)
+    given = IngestedMeshes(replace(MESHES, vertices=wrong.astype(np.float32)), "world", False)
+    located = locate_body(clip_of(masks), given, LocationConfig())
+    assert np.abs(np.median(located.translations, axis=0) + offset).max() < 0.03
+
+
+@pytest.mark.parametrize("distance", [1.2, 8.0, 40.0])
+def test_the_target_may_be_anywhere_before_the_camera(distance):
+    camera = look_at([0, -distance, 1.0], [0, 0, 0.9], 50 * distance, 128, 128)
+    clip = replace(clip_of(silhouettes(MESHES.vertices, MESHES.faces, camera)), camera=camera)
+    in_camera = camera.to_camera(MESHES.vertices.astype(float))
+    roots = in_camera.mean(axis=1)
+    bodies = replace(MESHES, vertices=(in_camera - roots[:, None]).astype(np.float32))
+    located = locate_body(
+        clip, IngestedMeshes(bodies, "camera-root-centred", False), LocationConfig()
+    )
+    error = np.abs(located.translations - roots)
+    assert np.median(error[:, :2]) < 0.01
+    # Depth follows from size: a share of the distance.
+    assert np.median(error[:, 2]) < 0.02 * distance
+
+
+def test_masks_that_show_nobody_are_refused(masks):
+    with pytest.raises(InputError, match="shows the person"):
+        locate_body(clip_of(masks & False), root_centred(), LocationConfig())
+
+
+def test_the_search_is_deterministic_and_survives_saving(masks, tmp_path):
+    first = locate_body(clip_of(masks[:3]), root_centred(), LocationConfig())
+    second = locate_body(clip_of(masks[:3]), root_centred(), LocationConfig())
+    assert np.array_equal(first.translations, second.translations)
+    first.save(tmp_path)
+    loaded = LocatedMeshes.load(tmp_path)
+    assert np.array_equal(loaded.translations, first.translations)
+    assert np.array_equal(loaded.meshes.vertices, first.meshes.vertices)
+    assert loaded.warnings == first.warnings

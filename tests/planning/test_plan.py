@@ -1,0 +1,163 @@
+"""Each decision follows its evidence, and the configuration has the last word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.capture.extract import CaptureConfig, extract_clip
+from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.planning.inspection import inspect_scene
+from mocoflow_core.planning.plan import (
+    PlanConfig,
+    ScenePlan,
+    decide_evaluation,
+    decide_location,
+    plan_scene,
+)
+from tests.capsule_person import capsule_person, default_recipe, edit_description, write_scene
+
+DECISIONS = [
+    "background_extraction",
+    "mask_segmentation",
+    "location_search",
+    "motion_fields",
+    "motion_residual",
+    "motion_consensus",
+    "fit_motion_steps",
+    "appearance_codes",
+]
+
+
+def planned(folder, change_meshes=lambda meshes: meshes, change_clip=lambda clip: clip, **config):
+    scene = open_scene(folder)
+    ingested = ingest_meshes(scene)
+    clip = change_clip(extract_clip(scene, CaptureConfig()))
+    meshes = change_meshes(ingested.meshes)
+    return plan_scene(clip, meshes, inspect_scene(scene, ingested), PlanConfig(**config))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_scene(tmp_path, default_recipe())
+
+
+def bent(meshes):
+    """The arms 20 degrees off: an estimate with errors."""
+    count = len(meshes.vertices)
+    share = np.linspace(0, 1, count)
+    places = np.stack([share - 0.5, 0.3 * np.sin(3 * share), 0 * share], axis=-1)
+    return capsule_person(2 * share, 0.4 * np.sin(6 * share) - 0.35, places)
+
+
+def test_a_scene_that_brings_everything_needs_motion_alone(folder):
+    plan = planned(folder)
+    assert [decision.name for decision in plan.decisions] == DECISIONS
+    assert [name for name in DECISIONS if plan.needs(name)] == ["motion_fields"]
+
+
+def test_every_decision_says_why_and_what_it_saves(folder):
+    for decision in planned(folder).decisions:
+        assert decision.reason
+        assert decision.saves
+        assert decision.threshold is not None
+        assert decision.evidence
+
+
+def test_meshes_off_the_masks_need_a_residual_and_its_consensus(folder):
+    plan = planned(folder, bent)
+    assert plan.needs("motion_residual")
+    assert plan.needs("motion_consensus")
+    assert plan.needs("fit_motion_steps")
+    evidence = plan.decision("motion_residual").evidence
+    assert evidence["outline_px"] > plan.decision("motion_residual").threshold
+
+
+def test_a_body_that_stands_still_needs_no_motion(tmp_path):
+    still = capsule_person([0.3] * 5, [0] * 5, np.zeros((5, 3)))
+    folder = write_scene(tmp_path, replace(default_recipe(), meshes=still))
+    plan = planned(folder)
+    assert not plan.needs("motion_fields")
+    assert not plan.needs("motion_residual")
+
+
+def test_missing_plates_and_masks_are_to_be_made(tmp_path):
+    folder = write_scene(tmp_path / "a", replace(default_recipe(16), background=False))
+    assert planned(folder).needs("background_extraction")
+    folder = write_scene(tmp_path / "b", replace(default_recipe(), masks=False))
+    assert planned(folder).needs("mask_segmentation")
+
+
+def test_changing_light_needs_appearance_codes(folder):
+    def flickering(clip):
+        gains = 1 + 0.2 * (np.arange(len(clip.frames)) % 2)
+        frames = clip.frames * gains[:, None, None, None]
+        return replace(clip, frames=frames.clip(0, 255).astype(np.uint8))
+
+    assert planned(folder, change_clip=flickering).needs("appearance_codes")
+
+
+@pytest.mark.parametrize("name", DECISIONS)
+@pytest.mark.parametrize("force", ["on", "off"])
+def test_every_decision_can_be_forced(folder, name, force):
+    plan = planned(folder, **{name: force})
+    assert plan.needs(name) == (force == "on")
+    assert f"forced {force}" in plan.decision(name).reason
+
+
+def test_forcing_the_residual_off_leaves_nothing_to_regularise(folder):
+    plan = planned(folder, bent, motion_residual="off")
+    assert not plan.needs("motion_consensus")
+
+
+def test_the_location_is_searched_when_it_is_unknown_or_overlaps_badly(folder):
+    scene = open_scene(folder)
+    inspection = inspect_scene(scene, ingest_meshes(scene))
+    assert not decide_location(inspection, PlanConfig()).needed
+    unlocated = inspection.model_copy(update={"located": False})
+    assert decide_location(unlocated, PlanConfig()).needed
+    poor = inspection.model_copy(update={"overlap": 0.3})
+    assert decide_location(poor, PlanConfig()).needed
+
+
+def test_the_canonical_frame_is_the_most_spread_one_that_is_trained_on(tmp_path):
+    swings = [0.4, 0.2, 0.0, -0.2, -0.5, 0.1]
+    meshes = capsule_person([0.1] * 6, swings, np.zeros((6, 3)))
+    folder = write_scene(tmp_path, replace(default_recipe(), meshes=meshes))
+    assert planned(folder).canonical_frame == 4
+
+    def holding_out(clip):
+        return replace(clip, held_out=clip.frame_indices == 4)
+
+    assert planned(folder, change_clip=holding_out).canonical_frame == 3
+
+
+def test_the_shell_is_as_wide_as_mask_pixels_lie_outside_the_body(folder):
+    def thin(meshes):
+        return replace(meshes, vertices=meshes.vertices * np.float32([1, 1, 0.93]))
+
+    exact = planned(folder).shell_width_m
+    assert exact == PlanConfig().narrowest_shell_m
+    # The head now ends 12 cm below the mask's.
+    assert 0.06 < planned(folder, thin).shell_width_m <= 0.13
+
+
+def test_an_unknown_decision_is_an_error(folder):
+    with pytest.raises(KeyError, match="no decision 'magic'"):
+        planned(folder).needs("magic")
+
+
+def test_a_plan_survives_as_json(folder):
+    plan = planned(folder)
+    assert ScenePlan.model_validate_json(plan.model_dump_json()) == plan
+
+
+def test_other_cameras_decide_about_scores_and_nothing_else(folder):
+    assert decide_evaluation(open_scene(folder)).needed
+    before = planned(folder)
+    edit_description(folder, lambda d: d["cameras"].pop("cam01"))
+    assert not decide_evaluation(open_scene(folder)).needed
+    assert planned(folder) == before
