@@ -12,7 +12,7 @@ from pathlib import Path
 
 import anny
 import numpy as np
-import roma
+import roma  # type: ignore[import-untyped]
 import torch
 from anny.models import full_model, model_transforms, retopology
 from anny.models.model_data import PHENOTYPE_VARIATIONS, ModelData, ModelMetadata, RigConfig

@@ -62,9 +62,9 @@ class Outfit:
     def _along_arm(self, points: Array) -> Array:
         """0 at the shoulder, 1 at the wrist; the same for both arms."""
         shoulder, wrist = (self.person.bone_head(bone) for bone in ("upperarm01.L", "wrist.L"))
-        axis = (wrist - shoulder).astype(np.float32)
-        mirrored = np.abs(points) * [1, 0, 0] + points * [0, 1, 1]
-        return (mirrored - shoulder.astype(np.float32)) @ (axis / (axis @ axis))
+        axis = (wrist - shoulder) / np.sum((wrist - shoulder) ** 2)
+        left = np.where([True, False, False], np.abs(points), points)
+        return ((left - shoulder) @ axis).astype(np.float32)
 
     def albedo(self, points: Array, limbs: NDArray[np.int8]) -> Array:
         """Linear reflectance (N, 3) at rest-pose points (N, 3) of the given limbs (N,)."""
@@ -177,7 +177,7 @@ class Outfit:
         return colours
 
     def _head(self, points: Array) -> Array:
-        x, eye_y, z = np.abs(points[:, 0]), self._eyes[1], points[:, 2] - self._eyes[2]
+        x, eye_y, z = np.abs(points[:, 0]), self._eyes[1], points[:, 2] - np.float32(self._eyes[2])
         colours = self._skin(points)
         front = points[:, 1] < eye_y + 0.035
         eye = x - self._eyes[0]
@@ -195,24 +195,28 @@ class Outfit:
         strands = 0.5 + 0.5 * self._noise(points, (0.016, 0.03, 0.12))
         return linear("#1d120b") * (1 - strands[:, None]) + linear("#7a4a24") * strands[:, None]
 
+    def _limb_weight(self, *limbs: str) -> NDArray[np.float64]:
+        return self.person.limb_weights[:, [LIMBS.index(limb) for limb in limbs]].sum(axis=1)
+
     def stand_off(self, time: float) -> NDArray[np.float64]:
         """How far loose clothes stand off the skin at each vertex (V,), metres.
 
         They sway with the normalised time and vanish where limbs meet, lest they interpenetrate.
         """
         points = self.person.rest_vertices.astype(np.float32)
-        limb = self.person.limb_weights
-        torso, head = limb[:, LIMBS.index("torso")], limb[:, LIMBS.index("head")]
-        arms, legs = limb[:, [2, 3]].sum(axis=1), limb[:, [6, 7]].sum(axis=1)
         z, along = points[:, 2], self._along_arm(points)
         shirt = np.where(within(z, _HEM, _COLLAR), 0.012 + 0.05 * (0.45 - z).clip(0, 0.36), 0)
         sleeve = np.where(within(along, 0.1, _CUFF), 0.01 + 0.03 * along, 0)
         jeans = np.where(z > self._ankle_z + 0.04, 0.012 + 0.03 * (-z).clip(0, 0.9), 0)
         hair = np.where(z > self._eyes[2] + 0.06, 0.018, 0)
-        parts = [(torso, shirt), (arms, sleeve), (legs, jeans), (head, hair)]
-        offset = sum(
-            ((2 * weight - 1).clip(0, 1) * part for weight, part in parts), np.zeros(len(z))
-        )
+        parts = [
+            (("torso",), shirt),
+            (("arm.L", "arm.R"), sleeve),
+            (("leg.L", "leg.R"), jeans),
+            (("head",), hair),
+        ]
+        clear = [(2 * self._limb_weight(*limbs) - 1).clip(0, 1) * part for limbs, part in parts]
+        offset = np.sum(clear, axis=0)
         sway = np.sin(2 * np.pi * (6 * time + 3 * z + 2 * points[:, 0]))
         wrinkles = self._noise(points, 0.07)
         return offset * (1 + 0.25 * sway + 0.3 * wrinkles)
@@ -222,5 +226,5 @@ def _paint(colours: Array, mask: Mask, colour: str) -> None:
     colours[mask] = linear(colour)
 
 
-def _ellipse(u: Array, v: Array, half_u: float, half_v: float) -> Mask:
+def _ellipse(u: NDArray[np.floating], v: Array, half_u: float, half_v: float) -> Mask:
     return (u / half_u) ** 2 + (v / half_v) ** 2 < 1

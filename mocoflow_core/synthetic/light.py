@@ -12,7 +12,7 @@ Array = NDArray[np.float32]
 _AMBIENT, _LAMP = 0.62, 0.42  # Linear irradiance from the hemisphere and from the lamp.
 _SKY_SHARE = 0.22  # How much brighter a surface that looks up is than one that looks sideways.
 _WRAP = 0.35  # The lamp is broad: its light reaches a little round the terminator.
-_TO_LAMP = np.array([-0.45, -0.55, 0.70], np.float32) / np.float32(np.sqrt(0.995))
+_TO_LAMP = np.array([-0.45, -0.55, 0.7035624], np.float32)  # A unit vector.
 _LAMP_RADIUS = 0.16  # Of the lamp's disc as seen from one metre, for soft shadows.
 _SHADOW_RAYS = 8
 _SHADOW_START = 0.01  # Metres off the surface, lest it shadows itself.
@@ -20,12 +20,13 @@ _SHADOW_START = 0.01  # Metres off the surface, lest it shadows itself.
 
 def ambient(normals: Array) -> Array:
     """Irradiance (N,) of the hemisphere on surfaces with these unit normals (N, 3)."""
-    return _AMBIENT * (1 + _SKY_SHARE * normals[:, 2])
+    return np.float32(_AMBIENT) * (1 + np.float32(_SKY_SHARE) * normals[:, 2])
 
 
 def lamp(normals: Array) -> Array:
     """Irradiance (N,) of the unshadowed lamp."""
-    return _LAMP * np.clip((normals @ _TO_LAMP + _WRAP) / (1 + _WRAP), 0, None)
+    facing = (normals @ _TO_LAMP + np.float32(_WRAP)) / np.float32(1 + _WRAP)
+    return np.float32(_LAMP) * facing.clip(0)
 
 
 def lamp_visibility(points: Array, caster: RayCaster) -> Array:
@@ -34,7 +35,7 @@ def lamp_visibility(points: Array, caster: RayCaster) -> Array:
     for direction in _lamp_directions():
         starts = points + _SHADOW_START * direction
         visible += ~caster.occluded(starts, np.broadcast_to(direction, points.shape))
-    return visible / _SHADOW_RAYS
+    return visible / np.float32(_SHADOW_RAYS)
 
 
 def _lamp_directions() -> Array:

@@ -73,7 +73,7 @@ def turn(times: Times) -> Motion:
         "upperarm01.R": _arm("R", times, 12 + 8 * _wave(times, 2, 0.4), -14 * _wave(times, 2.5)),
         "lowerarm01.L": _elbow("L", times, 4 + 16 * _wave(times, 2, 0.1)),
         "lowerarm01.R": _elbow("R", times, 4 + 16 * _wave(times, 2, 0.6)),
-        "upperleg01.L": _about("x", -8 * np.maximum(0, _wave(times, 3)) ** 1.0, times),
+        "upperleg01.L": _about("x", -8 * np.maximum(0, _wave(times, 3)), times),
         "upperleg01.R": _about("x", -8 * np.maximum(0, _wave(times, 3, 0.5)), times),
         "lowerleg01.L": _about("x", 16 * np.maximum(0, _wave(times, 3)), times),
         "lowerleg01.R": _about("x", 16 * np.maximum(0, _wave(times, 3, 0.5)), times),
@@ -98,24 +98,24 @@ def still(times: Times) -> Motion:
 
 
 def walk_circle(times: Times) -> Motion:
-    """One round on a circle of 0.45 m radius, walking forwards."""
-    gait = 5.0  # Cycles of two steps over the round.
+    """One round on a circle of 0.3 m radius, walking forwards in small steps."""
+    gait = 3.0  # Cycles of two steps over the round, each step about 30 cm.
     left, right = _wave(times, gait), _wave(times, gait, 0.5)
     joints = {
-        "upperleg01.L": _about("x", -24 * left, times),
-        "upperleg01.R": _about("x", -24 * right, times),
-        "lowerleg01.L": _about("x", 8 + 34 * np.maximum(0, _wave(times, gait, 0.25)), times),
-        "lowerleg01.R": _about("x", 8 + 34 * np.maximum(0, _wave(times, gait, 0.75)), times),
+        "upperleg01.L": _about("x", -11 * left, times),
+        "upperleg01.R": _about("x", -11 * right, times),
+        "lowerleg01.L": _about("x", 5 + 30 * np.maximum(0, _wave(times, gait, 0.25)), times),
+        "lowerleg01.R": _about("x", 5 + 30 * np.maximum(0, _wave(times, gait, 0.75)), times),
         "foot.L": _about("x", 12 * _wave(times, gait, 0.3), times),
         "foot.R": _about("x", 12 * _wave(times, gait, 0.8), times),
-        "upperarm01.L": _arm("L", times, 30.0, 26 * right),
-        "upperarm01.R": _arm("R", times, 30.0, 26 * left),
+        "upperarm01.L": _arm("L", times, 30.0, 22 * right),
+        "upperarm01.R": _arm("R", times, 30.0, 22 * left),
         "lowerarm01.L": _elbow("L", times, 25 + 12 * right),
         "lowerarm01.R": _elbow("R", times, 25 + 12 * left),
         "spine03": _about("z", 6 * left, times),
     }
     angle = 2 * np.pi * times
-    path = 0.45 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    path = 0.30 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     # The person looks along -y at heading 0 and walks along the circle's tangent.
     return _motion(times, 180 + np.degrees(angle), joints, path)
 

@@ -28,9 +28,9 @@ class PixelBox:
         return cls(0, 0, camera.width, camera.height)
 
     @classmethod
-    def around(cls, points_world: NDArray[np.float64], camera: Camera) -> PixelBox:
+    def around(cls, points_world: NDArray[np.floating], camera: Camera) -> PixelBox:
         """The pixels that points (N, 3) in front of the camera project to, inside its image."""
-        pixels = camera.project(points_world)
+        pixels = camera.project(np.asarray(points_world, np.float64))
         size = [camera.width, camera.height]
         low = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, size).astype(int)
         high = np.clip(np.ceil(pixels.max(axis=0)) + 1, low, size).astype(int)

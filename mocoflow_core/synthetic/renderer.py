@@ -81,4 +81,4 @@ class FrameRenderer:
         near = shadow_pixels(background, _SHADOW_REACH)
         visible = np.ones((*near.shape, 1), np.float32)
         visible[near, 0] = lamp_visibility(background.points[near], self._caster)
-        return background.ambient + visible * background.lamp
+        return np.asarray(background.ambient + visible * background.lamp, np.float32)

@@ -49,7 +49,7 @@ class SceneFiles:
         faces: NDArray[np.int32],
         keypoints3d: NDArray[np.float64],
     ) -> None:
-        """The rendered surface (T, V, 3), (F, 3) and the COCO keypoints (T, 17, 3), world metres."""
+        """The rendered surface (T, V, 3), (F, 3), the COCO keypoints (T, 17, 3), world metres."""
         self._folder.mkdir(parents=True, exist_ok=True)
         with (self._folder / "truth.npz").open("wb") as file:
             np.savez(

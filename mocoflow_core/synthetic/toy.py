@@ -16,7 +16,7 @@ from skimage.measure import marching_cubes
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.synthetic.configuration import RecordingConfig
-from mocoflow_core.synthetic.recording import Performance, record_scene
+from mocoflow_core.synthetic.recording import Performance, Progress, record_scene
 from mocoflow_core.synthetic.scene_files import SceneFiles
 from mocoflow_core.synthetic.surface import Surface
 from mocoflow_core.synthetic.texture import Array, checker, linear, stripes
@@ -44,6 +44,8 @@ _KEYPOINTS = (
 )
 _VERTICES_PER_KEYPOINT = 12
 
+_ATTRIBUTION = "Rendered from five capsules."
+
 
 class ToyConfig(RecordingConfig):
     """A recording small enough for tests."""
@@ -58,7 +60,9 @@ class ToyConfig(RecordingConfig):
     wave_deg: float = Field(25.0, description="How far arms and legs swing to each side.")
 
 
-def write_toy_scene(folder: Path, configuration: ToyConfig | None = None) -> None:
+def write_toy_scene(
+    folder: Path, configuration: ToyConfig | None = None, progress: Progress | None = None
+) -> None:
     """Write the toy scene; its meshes are exact. Raises InputError if the folder holds anything."""
     configuration = configuration or ToyConfig()
     files = SceneFiles(folder)
@@ -75,7 +79,7 @@ def write_toy_scene(folder: Path, configuration: ToyConfig | None = None) -> Non
     )
     keypoints = np.einsum("kv,tvd->tkd", regressor, vertices)
     performance = Performance(surface, vertices, keypoints, root)
-    record_scene(performance, meshes, configuration, files, "Rendered from five capsules.")
+    record_scene(performance, meshes, configuration, files, _ATTRIBUTION, progress)
 
 
 def _distances(points: Points) -> NDArray[np.float64]:
@@ -108,7 +112,7 @@ def _skinning(rest: Points) -> NDArray[np.float64]:
 
 
 def _posed(rest: Points, configuration: ToyConfig) -> tuple[Points, Points]:
-    """World vertices (T, V, 3) and root (T, 3): the figure turns, limbs swing about their joints."""
+    """World vertices (T, V, 3), root (T, 3): the figure turns, limbs swing about their joints."""
     times = np.linspace(0, 1, configuration.frames)
     swing = configuration.wave_deg * np.sin(2 * np.pi * times)
     axes = {_LEFT_ARM: ("y", 1), _RIGHT_ARM: ("y", 1), _LEFT_LEG: ("x", 1), _RIGHT_LEG: ("x", -0.6)}
@@ -133,7 +137,8 @@ def _keypoint_regressor(rest: Points) -> NDArray[np.float64]:
     regressor = np.zeros((len(_KEYPOINTS), len(rest)))
     for row, (capsule, along, sideways) in enumerate(_KEYPOINTS):
         start, end, _ = _CAPSULES[capsule]
-        place = np.add(start, along * np.subtract(end, start)) + [sideways, -0.1 * (row < 3), 0.0]
+        forward = 0.1 if row < 3 else 0.0  # Nose and eyes lie in front.
+        place = start + along * np.subtract(end, start) + np.array([sideways, -forward, 0.0])
         nearest = np.linalg.norm(rest - place, axis=1).argsort()[:_VERTICES_PER_KEYPOINT]
         regressor[row, nearest] = 1 / _VERTICES_PER_KEYPOINT
     return regressor
