@@ -49,12 +49,11 @@ def test_the_coarse_regressor_finds_the_keypoints(small_turn, person, performed)
     assert error.max() < 0.01
 
 
-def test_the_coarse_mesh_encloses_the_volume_of_the_body(small_turn, person, performed):
+def test_the_coarse_mesh_is_closed_and_has_the_volume_of_a_person(small_turn, person, performed):
     meshes = _estimate(small_turn, person, performed, "other_topology")
     coarse = Trimesh(meshes.vertices[0], meshes.faces, process=False)
     assert coarse.is_watertight
-    assert coarse.volume == pytest.approx(person.shape.height * 0.17, rel=0.5)
-    assert coarse.volume > 0
+    assert 0.05 < coarse.volume < 0.1  # Cubic metres, about those of water of the same mass.
 
 
 def test_joint_noise_has_the_promised_root_mean_square_angle(small_turn, performed):
