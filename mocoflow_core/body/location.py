@@ -43,6 +43,9 @@ class LocationConfig(ConfigurationPart):
         1.5, ge=1, description="Side of the crops, times the longer side of the mask's box."
     )
     outline_iterations: int = Field(8, ge=0, description="Most steps of the outline fit.")
+    usual_offset_m: float = Field(
+        0.02, gt=0, description="How far clothes or wide masks usually move an outline, metres."
+    )
     least_overlap: float = Field(
         0.4, ge=0, lt=1, description="Frames that overlap less say nothing of the location."
     )
@@ -160,7 +163,14 @@ def _place(
     front = facing(points + start, faces)
     best = search_grid(points, front, grid, start, configuration.spans, configuration.depths)
     front = facing(points + best.translation, faces)
-    refined = fit_outline(points, front, fine, best.translation, configuration.outline_iterations)
+    refined = fit_outline(
+        points,
+        front,
+        fine,
+        best.translation,
+        configuration.outline_iterations,
+        configuration.usual_offset_m,
+    )
     return Placement(refined, _overlap(points + refined, front, fine))
 
 

@@ -13,9 +13,9 @@ from mocoflow_core.body.location import LocatedMeshes, LocationConfig, locate_bo
 from mocoflow_core.body.silhouette import silhouettes
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
-from tests.capsule_person import look_at, walking
+from tests.capsule_person import capsule_person, look_at, walking
 
-FRAMES = 10
+FRAMES = 7
 CAMERA = look_at([0.3, -3.0, 1.3], [0, 0, 0.9], 150, 128, 128)
 MESHES = walking(FRAMES)
 IN_CAMERA = CAMERA.to_camera(MESHES.vertices.astype(float))
@@ -74,13 +74,28 @@ def test_clothes_and_tight_masks_do_not_change_the_depth(masks, shape):
     assert np.median(depth) < 0.05
 
 
+def test_limbs_in_another_pose_do_not_pass_for_another_distance(masks):
+    share = np.linspace(0, 1, FRAMES)
+    places = np.stack([share - 0.5, 0.3 * np.sin(3 * share), 0 * share], axis=-1)
+    wrong = capsule_person(2 * share, 0.4 * np.sin(6 * share) + 0.3, places)
+    vertices = CAMERA.to_camera(wrong.vertices.astype(float)) - ROOTS[:, None]
+    bodies = replace(wrong, vertices=vertices.astype(np.float32))
+    located = locate_body(
+        clip_of(masks), IngestedMeshes(bodies, "camera-root-centred", False), LocationConfig()
+    )
+    lateral, depth = errors_m(located)
+    assert np.median(lateral) < 0.02
+    assert np.median(depth) < 0.05
+    assert depth.max() < 0.15
+
+
 def test_frames_without_a_person_are_interpolated(masks):
     gaps = masks.copy()
-    gaps[4:6] = False
+    gaps[3:5] = False
     located = locate_body(clip_of(gaps), root_centred(), LocationConfig())
     lateral, depth = errors_m(located)
-    assert (located.confidence[4:6] == 0).all()
-    assert np.isnan(located.residual[4:6]).all()
+    assert (located.confidence[3:5] == 0).all()
+    assert np.isnan(located.residual[3:5]).all()
     assert lateral.max() < 0.05
     assert depth.max() < 0.1
 
@@ -96,12 +111,12 @@ def test_held_out_frames_are_not_looked_at(masks):
 
 def test_masks_cut_by_the_border_count_little(masks):
     cut = masks.copy()
-    cut[5, 60:] = False
-    cut[5] = np.roll(cut[5], 128 - 60, axis=0)
+    cut[3, 60:] = False
+    cut[3] = np.roll(cut[3], 128 - 60, axis=0)
     located = locate_body(clip_of(cut), root_centred(), LocationConfig())
-    assert located.confidence[5] < 0.05 * np.median(located.confidence)
-    assert errors_m(located)[0][5] < 0.1
-    assert "1 of 10 masks" in located.warnings[0]
+    assert located.confidence[3] < 0.05 * np.median(located.confidence)
+    assert errors_m(located)[0][3] < 0.1
+    assert f"1 of {FRAMES} masks" in located.warnings[0]
 
 
 def test_a_clip_of_cut_masks_alone_is_still_located():
@@ -120,7 +135,7 @@ def test_what_is_given_is_where_the_search_starts(masks):
     assert np.abs(np.median(located.translations, axis=0) + offset).max() < 0.03
 
 
-@pytest.mark.parametrize("distance", [1.2, 8.0, 40.0])
+@pytest.mark.parametrize("distance", [2.0, 8.0, 40.0])
 def test_the_target_may_be_anywhere_before_the_camera(distance):
     camera = look_at([0, -distance, 1.0], [0, 0, 0.9], 50 * distance, 128, 128)
     clip = replace(clip_of(silhouettes(MESHES.vertices, MESHES.faces, camera)), camera=camera)
