@@ -24,6 +24,8 @@ LEAST_SCALE_PX = 0.5
 # The outline is known to a fraction of a pixel; a smaller step changes nothing.
 SMALL_STEP_PX = 0.02
 SMALL_STEP_SHARE = 5e-4
+# Distances are linear in the move only nearby; this also keeps the body before the camera.
+LONGEST_STEP_SHARE = 0.2
 # An outline has about so many parts that err on their own: limbs, and stretches of the trunk.
 INDEPENDENT_PARTS = 30
 # Too few points leave the four unknowns open.
@@ -94,6 +96,7 @@ def fit_outline(
             best, least = translation, unlike
         depth = float((points.mean(axis=0) + translation)[2])
         step = _step(offsets, depth, crop.K, usual_offset_m * crop.focal_px / depth)
+        step *= min(1.0, LONGEST_STEP_SHARE * depth / max(float(np.abs(step).max()), 1e-12))
         translation = translation + step
         step_px = np.abs(step[:2]).max() * crop.focal_px / depth
         if step_px < SMALL_STEP_PX and abs(step[2]) < SMALL_STEP_SHARE * depth:

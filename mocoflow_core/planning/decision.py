@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, field_validator
 
 Force = Literal["auto", "on", "off"]
 
@@ -20,6 +21,12 @@ class Decision(BaseModel):
     evidence: dict[str, float] = {}
     threshold: float | None = None
     saves: str = ""
+
+    @field_validator("evidence")
+    @classmethod
+    def _known(cls, evidence: dict[str, float]) -> dict[str, float]:
+        """What could not be measured is left out: JSON has no word for it."""
+        return {name: value for name, value in evidence.items() if math.isfinite(value)}
 
     def forced(self, force: Force) -> Decision:
         """The same decision after the configuration has had its say."""

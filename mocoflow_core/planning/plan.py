@@ -9,6 +9,7 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.errors import InputError
 from mocoflow_core.planning.brightness import brightness_shifts
 from mocoflow_core.planning.canonical_frame import closeness
 from mocoflow_core.planning.decision import Decision, Force
@@ -95,8 +96,17 @@ def plan_scene(
 
 
 def decide_location(inspection: Inspection, configuration: PlanConfig) -> Decision:
-    """Whether the body's location must be searched; asked before any mesh is in the world."""
+    """Whether the body's location must be searched; asked before any mesh is in the world.
+
+    Raises InputError when it is forced off for meshes that have no location at all.
+    """
     overlap = inspection.overlap
+    if inspection.coordinates == "camera-root-centred" and configuration.location_search == "off":
+        raise InputError(
+            "meshes with a location when plan.location_search is off",
+            "root-centred ones",
+            "Leave plan.location_search on auto.",
+        )
     if not inspection.located:
         reason = "the meshes come without a location that can be trusted"
         needed = True

@@ -10,6 +10,7 @@ import pytest
 from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.errors import InputError
 from mocoflow_core.planning.inspection import inspect_scene
 from mocoflow_core.planning.plan import (
     PlanConfig,
@@ -100,12 +101,12 @@ def test_changing_light_needs_appearance_codes(folder):
     assert planned(folder, change_clip=flickering).needs("appearance_codes")
 
 
-@pytest.mark.parametrize("name", DECISIONS)
 @pytest.mark.parametrize("force", ["on", "off"])
-def test_every_decision_can_be_forced(folder, name, force):
-    plan = planned(folder, **{name: force})
-    assert plan.needs(name) == (force == "on")
-    assert f"forced {force}" in plan.decision(name).reason
+def test_every_decision_can_be_forced(folder, force):
+    plan = planned(folder, **dict.fromkeys(DECISIONS, force))
+    for name in DECISIONS:
+        assert plan.needs(name) == (force == "on")
+        assert f"forced {force}" in plan.decision(name).reason
 
 
 def test_forcing_the_residual_off_leaves_nothing_to_regularise(folder):
@@ -121,6 +122,27 @@ def test_the_location_is_searched_when_it_is_unknown_or_overlaps_badly(folder):
     assert decide_location(unlocated, PlanConfig()).needed
     poor = inspection.model_copy(update={"overlap": 0.3})
     assert decide_location(poor, PlanConfig()).needed
+
+
+def test_a_body_without_a_location_must_be_searched(folder):
+    scene = open_scene(folder)
+    nowhere = inspect_scene(scene, ingest_meshes(scene)).model_copy(
+        update={"coordinates": "camera-root-centred", "located": False}
+    )
+    with pytest.raises(InputError, match="root-centred"):
+        decide_location(nowhere, PlanConfig(location_search="off"))
+
+
+def test_evidence_that_could_not_be_measured_is_left_out(folder):
+    def nobody(clip):
+        return replace(clip, masks=clip.masks & False)
+
+    plan = planned(folder, change_clip=nobody)
+    assert ScenePlan.model_validate_json(plan.model_dump_json()) == plan
+    # What cannot be shown to be needless is kept.
+    assert plan.needs("motion_residual")
+    assert plan.needs("appearance_codes")
+    assert plan.shell_width_m == PlanConfig().widest_shell_m
 
 
 def test_the_canonical_frame_is_the_most_spread_one_that_is_trained_on(tmp_path):
