@@ -35,9 +35,7 @@ def describe_run(
     return {
         "machine": {**describe_machine(), "threads": trained.summary["threads"]},
         "train_camera": train_camera,
-        "capture": {
-            name: clip.summary[name] for name in ("fps", "first_frame", "last_frame", "up")
-        },
+        "capture": {name: clip.summary[name] for name in CAPTURE},
         "cameras": {train_camera: camera, **evaluation.summary["cameras"]},
         "stages": records(stages),
         "scores": scores.summary["mean"],
