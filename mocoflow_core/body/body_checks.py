@@ -14,6 +14,8 @@ from mocoflow_core.geometry.camera import Camera
 USUAL_HEIGHT_M = (1.2, 2.2)
 USUAL_DISTANCE_M = (1.0, 15.0)
 LEAST_OVERLAP = 0.6
+# A sprinter's speed; an estimate that jumps to another person is faster.
+FASTEST_M_S = 12.0
 # A neighbouring frame that fits better by this much shows an estimate that is off by one.
 SHIFT_GAIN = 0.02
 SHIFTS = (-1, 0, 1)
@@ -41,6 +43,21 @@ def check_distance(meshes_world: MeshSequence, camera: Camera) -> tuple[float, t
     return distance, (
         f"the body is {distance:.2f} m in front of {camera.name} "
         f"(usual: {USUAL_DISTANCE_M[0]:g} to {USUAL_DISTANCE_M[1]:g} m)",
+    )
+
+
+def check_path(meshes_world: MeshSequence, fps: float) -> tuple[float, tuple[str, ...]]:
+    """Fastest motion of the body's centre between frames, metres per second, and warnings."""
+    if len(meshes_world.vertices) < 2:
+        return 0.0, ()
+    steps = np.diff(np.median(meshes_world.vertices, axis=1), axis=0)
+    speeds = np.linalg.norm(steps, axis=1) * fps / np.diff(meshes_world.frame_indices)
+    row = int(speeds.argmax())
+    if speeds[row] <= FASTEST_M_S:
+        return float(speeds[row]), ()
+    return float(speeds[row]), (
+        f"the body moves at {speeds[row]:.1f} m/s at frame {meshes_world.frame_indices[row]} "
+        f"(usual: below {FASTEST_M_S:g}): another person's mesh, or a jump of the estimate?",
     )
 
 

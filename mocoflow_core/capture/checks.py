@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,10 @@ from mocoflow_core.geometry.camera import Camera
 FOREGROUND_SHARE = (0.01, 0.6)
 # The method assumes a camera that stands still.
 LARGEST_BACKGROUND_MOTION_PX = 0.5
+# Lenses of video cameras see between these, in degrees across the longer side.
+FIELD_OF_VIEW_DEG = (5.0, 130.0)
+# Pixels of cameras are square to about this.
+SQUARE_PIXELS = 0.05
 # 59.94 and 60 are the same rate.
 RATE_TOLERANCE = 0.02
 
@@ -34,7 +39,7 @@ def check_capture(clip: Clip, source: Camera) -> CaptureFindings:
     share = float(np.median(shares))
     motion_px = background_motion_px(clip.frames, clip.masks) * source.width / clip.camera.width
     empty = int((shares == 0).sum())
-    warnings = _principal_point(source)
+    warnings = _principal_point(source) + _focal_length(source)
     if not FOREGROUND_SHARE[0] <= share <= FOREGROUND_SHARE[1]:
         warnings.append(
             f"masks cover {100 * share:.2g} % of the image "
@@ -49,6 +54,14 @@ def check_capture(clip: Clip, source: Camera) -> CaptureFindings:
             f"(limit {LARGEST_BACKGROUND_MOTION_PX} px): does the camera stand still?"
         )
     return CaptureFindings(share, empty, motion_px, tuple(warnings))
+
+
+def check_masks(masks: Iterable[int], frames: Iterable[int]) -> tuple[str, ...]:
+    """Whether masks and frames belong together: masks of frames that do not exist show a shift."""
+    foreign = sorted(set(masks) - set(frames))
+    if not foreign:
+        return ()
+    return (f"{len(foreign)} masks belong to no frame, the first {foreign[0]}: off by one?",)
 
 
 def check_rate(stated_fps: float | None, scene_fps: float) -> tuple[str, ...]:
@@ -66,3 +79,19 @@ def _principal_point(camera: Camera) -> list[str]:
         f"the principal point ({cx:.0f}, {cy:.0f}) of {camera.name} lies outside its "
         f"{camera.width} x {camera.height} image: swapped sizes, or K of another resolution?"
     ]
+
+
+def _focal_length(camera: Camera) -> list[str]:
+    fx, fy = float(camera.K[0, 0]), float(camera.K[1, 1])
+    side = max(camera.width, camera.height)
+    view_deg = float(np.degrees(2 * np.arctan(side / (2 * np.sqrt(fx * fy)))))
+    warnings = []
+    if not FIELD_OF_VIEW_DEG[0] <= view_deg <= FIELD_OF_VIEW_DEG[1]:
+        warnings.append(
+            f"{camera.name} sees {view_deg:.3g} degrees "
+            f"(usual: {FIELD_OF_VIEW_DEG[0]:g} to {FIELD_OF_VIEW_DEG[1]:g}): "
+            "a focal length that is not in pixels of this size?"
+        )
+    if abs(fx / fy - 1) > SQUARE_PIXELS:
+        warnings.append(f"pixels of {camera.name} are not square: fx {fx:.0f}, fy {fy:.0f}")
+    return warnings

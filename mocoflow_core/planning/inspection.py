@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mocoflow_core.body.body_checks import check_distance, check_height, check_overlap
+from mocoflow_core.body.body_checks import check_distance, check_height, check_overlap, check_path
 from mocoflow_core.body.ingest import IngestedMeshes
-from mocoflow_core.capture.checks import check_capture, check_rate
+from mocoflow_core.capture.checks import check_capture, check_masks, check_rate
 from mocoflow_core.capture.extract import (
     CaptureConfig,
     extract_camera,
@@ -42,6 +42,7 @@ class Inspection(BaseModel):
     background_motion_px: float | None
     body_height_m: float | None = None
     body_distance_m: float | None = None
+    fastest_m_s: float | None = None
     overlap: float | None = None
     overlap_previous_mesh: float | None = None
     overlap_next_mesh: float | None = None
@@ -66,7 +67,8 @@ def inspect_scene(
     camera = scene.cameras[scene.train_camera]
     frames = scene.frames(scene.train_camera)
     findings = check_capture(clip, camera)
-    rate_warnings = check_rate(frames.fps, scene.description.fps)
+    files = check_rate(frames.fps, scene.description.fps)
+    files += check_masks(scene.masks(scene.train_camera), frames.indices.tolist())
     motion_px = findings.background_motion_px
     inspection = Inspection(
         frame_count=len(frames.indices),
@@ -79,7 +81,7 @@ def inspect_scene(
         located=meshes.located if meshes else None,
         foreground_share=findings.foreground_share,
         background_motion_px=motion_px if np.isfinite(motion_px) else None,
-        warnings=findings.warnings + rate_warnings,
+        warnings=findings.warnings + files,
     )
     if meshes is None:
         return inspection
@@ -90,9 +92,11 @@ def inspect_scene(
     if in_world:
         distance, distance_warnings = check_distance(meshes.meshes, camera)
         overlaps, overlap_warnings = check_overlap(clip, meshes.meshes)
-        warnings += distance_warnings + overlap_warnings
+        speed, path_warnings = check_path(meshes.meshes, scene.description.fps)
+        warnings += distance_warnings + overlap_warnings + path_warnings
         measured |= {
             "body_distance_m": distance,
+            "fastest_m_s": speed,
             "overlap": overlaps[0],
             "overlap_previous_mesh": overlaps[-1],
             "overlap_next_mesh": overlaps[1],

@@ -106,6 +106,31 @@ def test_a_principal_point_outside_the_image_is_warned_of(folder):
     assert any("principal point" in warning for warning in inspect_scene(scene, None).warnings)
 
 
+def test_a_focal_length_of_another_image_size_is_warned_of(folder):
+    def change(description):
+        K = description["cameras"]["cam00"]["K"]
+        K[0][0], K[1][1] = 20 * K[0][0], 22 * K[1][1]
+
+    edit_description(folder, change)
+    warnings = inspect_scene(open_scene(folder), None).warnings
+    assert any("degrees" in warning for warning in warnings)
+    assert any("not square" in warning for warning in warnings)
+
+
+def test_masks_of_frames_that_do_not_exist_are_warned_of(folder):
+    masks = folder / "masks/cam00"
+    (masks / "000006.png").write_bytes((masks / "000005.png").read_bytes())
+    assert any("1 masks belong to no frame, the first 6" in w for w in inspected(folder).warnings)
+
+
+def test_a_jump_to_another_place_is_warned_of(folder):
+    meshes = default_recipe().meshes
+    vertices = meshes.vertices.copy()
+    vertices[3] += np.float32([1.5, 0, 0])
+    replace(meshes, vertices=vertices).save(folder / "meshes.npz")
+    assert any("m/s at frame 2" in warning for warning in inspected(folder).warnings)
+
+
 def test_nothing_of_other_cameras_reaches_the_inspection(folder):
     before = inspected(folder)
     for path in (folder / "frames/cam01").iterdir():
