@@ -186,5 +186,5 @@ def _require_size(picture: NDArray[np.uint8], view: WorkingView, what: str) -> N
         raise InputError(
             f"{what} must be {view.source.width} x {view.source.height} as scene.json says",
             f"{width} x {height}",
-            "Correct width, height and K in scene.json, or the file.",
+            "Give the picture that size, or correct width, height and K together.",
         )
