@@ -19,7 +19,8 @@ from mocoflow_core.body.mesh_checks import (
     require_shapes,
 )
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.capture.scene import MeshesDescription, Scene
+from mocoflow_core.capture.scene import Scene
+from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 
 FileCoordinates = Literal["world", "camera", "camera-root-centred"]

@@ -1,20 +1,23 @@
-"""The native scene folder: its description, validated, and the files behind it."""
+"""An opened scene folder: its cameras, and the files behind each part."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mocoflow_core.capture.frame_source import (
     FrameSource,
     numbered_images,
     open_frame_source,
+)
+from mocoflow_core.capture.scene_description import (
+    CameraDescription,
+    SceneDescription,
+    read_description,
 )
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
@@ -24,62 +27,6 @@ UP_VECTORS = {
     for row, axis in enumerate("xyz")
     for sign in "+-"
 }
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class WorldDescription(_Part):
-    """Unit and direction of up of the world's axes."""
-
-    unit: Literal["m"]
-    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-
-
-class CameraDescription(_Part):
-    """Calibration of one camera and where its pictures lie; paths relative to the scene."""
-
-    width: int = Field(gt=0)
-    height: int = Field(gt=0)
-    K: list[list[float]]
-    distortion: list[float] = [0.0] * 5
-    R: list[list[float]]
-    t: list[float]
-    frames: str
-    masks: str | None = None
-    background: str | None = None
-
-
-class MeshesDescription(_Part):
-    """The body mesh estimate: file, axes, and whether its translation can be trusted."""
-
-    file: str
-    coordinates: Literal["world", "camera", "camera-root-centred"]
-    located: bool
-    source: str = ""
-
-
-class TruthDescription(_Part):
-    """Exact bodies or keypoints; the metrics alone read them."""
-
-    file: str
-
-
-class SceneDescription(_Part):
-    """The content of ``scene.json``."""
-
-    format: Literal["mocoflow-scene"]
-    version: Literal[1]
-    name: str
-    fps: float = Field(gt=0, allow_inf_nan=False)
-    world: WorldDescription
-    train_camera: str
-    cameras: dict[str, CameraDescription]
-    meshes: MeshesDescription | None = None
-    truth: TruthDescription | None = None
-    license: str = ""
-    attribution: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +120,7 @@ def open_scene(path: Path) -> Scene:
         raise InputError(
             "a scene folder with a scene.json", f"{path}", "Check the path of the scene."
         )
-    description = _parse(file)
+    description = read_description(file)
     if description.train_camera not in description.cameras:
         raise InputError(
             "train_camera must be one of the scene's cameras",
@@ -184,21 +131,6 @@ def open_scene(path: Path) -> Scene:
     scene = Scene(file.parent, description, cameras)
     _require_files(scene)
     return scene
-
-
-def _parse(file: Path) -> SceneDescription:
-    try:
-        return SceneDescription.model_validate(json.loads(file.read_text(encoding="utf-8")))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError("scene.json must be JSON", str(error), "Correct its syntax.") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(step) for step in first["loc"]) or "its root"
-        raise InputError(
-            f"scene.json must follow the scene format at {where}",
-            f"{first.get('input')!r:.80} ({first['msg']})",
-            "Compare it with the scene format in the README.",
-        ) from error
 
 
 def _camera(name: str, part: CameraDescription) -> Camera:

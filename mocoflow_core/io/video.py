@@ -35,7 +35,7 @@ def describe_video(path: Path) -> VideoDescription:
             count = sum(1 for packet in container.demux(stream) if packet.size)
             return VideoDescription(float(stream.average_rate or 0.0), count)
     except av.FFmpegError as error:
-        raise _undecodable(path, error.strerror) from error
+        raise _undecodable(path, error.strerror or str(error)) from error
 
 
 def read_frames(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, Image]]:
@@ -55,7 +55,7 @@ def read_frames(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, Imag
                 if not remaining:
                     return
     except av.FFmpegError as error:
-        raise _undecodable(path, error.strerror) from error
+        raise _undecodable(path, error.strerror or str(error)) from error
     if remaining:
         raise _undecodable(path, f"no frame {min(remaining)}")
 
