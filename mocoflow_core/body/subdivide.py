@@ -15,10 +15,31 @@ class Subdivision:
 
     weights: sparse.csr_matrix  # (fine V, coarse V), rows sum to one
     faces: NDArray[np.int32]  # (fine F, 3)
+    levels: int
 
     def refine(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
         """Values (fine V, C) at the fine vertices from values (V, C) at the coarse ones."""
         return np.asarray(self.weights @ values, np.float64)
+
+    def locate(
+        self, face_index: NDArray[np.int32], barycentric: NDArray[np.floating]
+    ) -> tuple[NDArray[np.int32], NDArray[np.floating]]:
+        """Fine face (N,) and weights (N, 3) of points given on the coarse mesh.
+
+        Casting rays at the coarse mesh and locating the hits costs a fraction of casting them at
+        the fine one, and it is the same surface.
+        """
+        face, weights = face_index, barycentric
+        count = len(self.faces) // 4**self.levels
+        for _ in range(self.levels):
+            corner = np.where(weights.max(axis=1) >= 0.5, weights.argmax(axis=1), 3)
+            at_corner = 2.0 * weights - np.eye(4, 3, dtype=weights.dtype)[corner]
+            # The middle child's corners are the midpoints of ab, bc and ca.
+            in_middle = 1.0 - 2.0 * np.roll(weights, 1, axis=1)
+            weights = np.where((corner == 3)[:, None], in_middle, at_corner)
+            face = (corner * count + face).astype(np.int32)
+            count *= 4
+        return face, weights
 
 
 def subdivide(faces: NDArray[np.int32], vertex_count: int, levels: int) -> Subdivision:
@@ -27,7 +48,7 @@ def subdivide(faces: NDArray[np.int32], vertex_count: int, levels: int) -> Subdi
     for _ in range(levels):
         midpoints, faces = _split(faces, weights.shape[0])
         weights = sparse.vstack([weights, midpoints @ weights], format="csr")
-    return Subdivision(weights, faces)
+    return Subdivision(weights, faces, levels)
 
 
 def levels_for(

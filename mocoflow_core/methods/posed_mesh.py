@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.body.rasterise import interpolate, rasterise
+from mocoflow_core.body.rasterise import rasterise
 from mocoflow_core.body.subdivide import Subdivision, levels_for, subdivide, unique_edges
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
@@ -32,7 +32,10 @@ class PosedMeshConfig(ConfigurationPart):
     """How the given mesh is coloured."""
 
     max_spacing_m: float = Field(
-        0.015, gt=0, description="Coloured vertices are this close, or one pixel if that is less."
+        0.015, gt=0, description="Coloured vertices are at least this close."
+    )
+    max_spacing_px: float = Field(
+        0.5, gt=0, description="Coloured vertices are at least this close in the train camera."
     )
     max_frames: int = Field(
         120, ge=1, description="Train frames looked at, evenly spread; bounds the memory."
@@ -42,7 +45,7 @@ class PosedMeshConfig(ConfigurationPart):
         0.02, gt=0, description="A vertex this far behind the first surface still counts as seen."
     )
     min_cosine: float = Field(
-        0.2, ge=0, lt=1, description="Between normal and line of sight; flatter sights are skipped."
+        0.4, ge=0, lt=1, description="Between normal and line of sight; flatter sights are skipped."
     )
 
 
@@ -50,6 +53,7 @@ class PosedMeshConfig(ConfigurationPart):
 class ColouredMesh:
     """A mesh with one colour per (fine) vertex, for any pose of the given coarse mesh."""
 
+    faces: NDArray[np.int32]  # (F, 3) of the given mesh
     subdivision: Subdivision
     colours: NDArray[np.float32]  # (fine V, 3) sRGB-encoded in [0, 1]
     seen: NDArray[np.bool_]  # (fine V,) false where the colour is a neighbour's
@@ -67,10 +71,16 @@ class ColouredMesh:
             Colour (H, W, 3) and opacity (H, W), means of 2 x 2 rays per pixel.
         """
         fine = camera.resized(SUPERSAMPLING * camera.width, SUPERSAMPLING * camera.height)
-        faces = self.subdivision.faces
-        raster = rasterise(self.subdivision.refine(vertices_world), faces, fine)
-        opacity = _mean_of_blocks(raster.covered[..., None].astype(np.float32))
-        colour = _mean_of_blocks(interpolate(raster, faces, self.colours))
+        raster = rasterise(vertices_world, self.faces, fine)
+        covered = raster.covered
+        face, weights = self.subdivision.locate(
+            raster.face_index[covered], raster.barycentric[covered]
+        )
+        corners = self.colours[self.subdivision.faces[face]]
+        image = np.zeros((fine.height, fine.width, 3), np.float32)
+        image[covered] = np.einsum("nk,nkc->nc", weights, corners)
+        opacity = _mean_of_blocks(covered[..., None].astype(np.float32))
+        colour = _mean_of_blocks(image)
         behind = np.asarray(background, np.float32)
         return colour + (1.0 - opacity) * behind, opacity[..., 0]
 
@@ -108,7 +118,9 @@ def colour_mesh(
             "Check the cameras, the mesh's coordinates and its location.",
         )
     rest = subdivision.refine(posed.vertices[0].astype(np.float64))
-    return ColouredMesh(subdivision, _fill(colours, seen, rest, subdivision.faces), seen)
+    return ColouredMesh(
+        posed.faces, subdivision, _fill(colours, seen, rest, subdivision.faces), seen
+    )
 
 
 def _subdivision(
@@ -117,7 +129,7 @@ def _subdivision(
     """The given triangles split until neighbours are about a pixel apart."""
     depth = float(np.median(camera.to_camera(posed.vertices.astype(np.float64))[..., 2]))
     pixel_m = abs(depth) / float(camera.K[0, 0])
-    spacing = min(pixel_m, configuration.max_spacing_m)
+    spacing = min(configuration.max_spacing_px * pixel_m, configuration.max_spacing_m)
     levels = levels_for(posed.vertices[0], posed.faces, spacing, configuration.max_vertices)
     return subdivide(posed.faces, posed.vertices.shape[1], levels)
 

@@ -50,3 +50,21 @@ def test_the_vertex_count_stays_within_its_bound(box: trimesh.Trimesh) -> None:
     levels = levels_for(box.vertices, box.faces, spacing_m=1e-6, max_vertices=5000)
     # Euler: V = F / 2 + 2 for a closed surface without holes.
     assert len(box.faces) * 4**levels / 2 + 2 <= 5000 < len(box.faces) * 4 ** (levels + 2) / 2
+
+
+def test_a_point_located_on_the_fine_mesh_is_the_same_point(box: trimesh.Trimesh) -> None:
+    rng = np.random.default_rng(0)
+    face = rng.integers(0, 12, 500).astype(np.int32)
+    # Corners, edges and midpoints are where a point could fall into the wrong child.
+    weights = np.concatenate(
+        [rng.dirichlet(np.ones(3), 490), np.eye(3), (1 - np.eye(3)) / 2, np.full((4, 3), 1 / 3)]
+    )
+    points = np.einsum("nk,nkc->nc", weights, box.vertices[box.faces[face]])
+    for levels in range(5):
+        fine = subdivide(box.faces, len(box.vertices), levels)
+        fine_face, fine_weights = fine.locate(face, weights)
+        corners = fine.refine(box.vertices)[fine.faces[fine_face]]
+        assert fine_weights.min() >= -1e-12
+        np.testing.assert_allclose(
+            np.einsum("nk,nkc->nc", fine_weights, corners), points, atol=1e-12
+        )
