@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from flows.prefect_settings import set_environment, without_heartbeat
+from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
 
 app = typer.Typer(
@@ -65,7 +65,7 @@ def reconstruct(
     set_environment()
     from flows.reconstruct import reconstruct as flow
 
-    with without_heartbeat():
+    with undisturbed():
         flow(
             scene=scene,
             out=request.out,

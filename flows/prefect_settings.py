@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,8 +26,9 @@ def set_environment() -> None:
 
 
 @contextmanager
-def without_heartbeat() -> Iterator[None]:
-    """Spare each flow the wait for its heartbeat thread; nobody watches a run on a laptop."""
+def undisturbed() -> Iterator[None]:
+    """No heartbeat, whose thread each flow waits for, and no remarks while events are sent."""
+    logging.getLogger("EventsWorker").setLevel(logging.CRITICAL)
     from prefect.settings import PREFECT_FLOWS_HEARTBEAT_FREQUENCY, temporary_settings
 
     with temporary_settings(updates={PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None}):

@@ -106,8 +106,9 @@ def reconstruct(
     folder.take(where.folder(scores) / "error_curve.parquet", "error_curve.parquet")
     folder.take(where.folder(report) / "report.html", "report.html")
     folder.take(rendered / "turntable.mp4", "turntable.mp4")
-    folder.take(rendered / "mocoflow" / "views", "views")
-    folder.take(rendered / "mocoflow" / "opacity", "opacity")
+    if views.summary["views"]:
+        folder.take(rendered / "mocoflow" / "views", "views")
+        folder.take(rendered / "mocoflow" / "opacity", "opacity")
     record = folder.finish(
         {**facts, "stages": records((*stages, evaluation, views, scores, report))}
     )

@@ -1,0 +1,248 @@
+"""The command line: exit codes, one-line reasons, and how it treats folders."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).parents[2]
+
+
+def mocoflow(*arguments, timeout=120):
+    return subprocess.run(
+        [sys.executable, "-c", "from flows.command_line import main; main()", *map(str, arguments)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )
+
+
+def refuse(*arguments, because):
+    """Runs it, and expects exit code 2 with one line on stderr that names the reason."""
+    run = mocoflow(*arguments)
+    assert run.returncode == 2, run.stderr
+    assert len(run.stderr.strip().splitlines()) == 1, run.stderr
+    assert because in run.stderr
+
+
+@pytest.fixture
+def scene(toy_scene, tmp_path):
+    return shutil.copytree(toy_scene, tmp_path / "scene")
+
+
+@pytest.fixture
+def describe(scene):
+    """Changes scene.json."""
+
+    def change(edit):
+        description = json.loads((scene / "scene.json").read_text())
+        edit(description)
+        (scene / "scene.json").write_text(json.dumps(description))
+
+    return change
+
+
+def test_help_is_instant():
+    start = time.perf_counter()
+    assert mocoflow("--help").returncode == 0
+    assert time.perf_counter() - start < 3.0  # Below 0.3 s alone; the tests share their machine.
+
+
+def test_help_loads_neither_torch_nor_prefect():
+    code = "import sys, flows.command_line; print({'torch', 'prefect', 'numpy'} & set(sys.modules))"
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.strip() == "set()"
+
+
+def test_an_unknown_field_is_refused_with_the_closest_one(toy_scene, tmp_path):
+    refuse(
+        *("reconstruct", toy_scene, "--out", tmp_path / "out", "--set", "schedule.fine_step=3"),
+        because="schedule.fine_steps",
+    )
+
+
+def test_a_value_that_its_field_refuses_is_named(toy_scene, tmp_path):
+    refuse(
+        *("reconstruct", toy_scene, "--out", tmp_path / "out", "--set", "schedule.rays=0"),
+        because="schedule.rays",
+    )
+
+
+def test_a_folder_that_holds_something_else_is_refused_and_left_alone(toy_scene, tmp_path):
+    (tmp_path / "thesis.txt").write_text("precious")
+    refuse("reconstruct", toy_scene, "--out", tmp_path, because="something else")
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_a_folder_of_other_settings_is_refused(first_run, toy_scene, store_url):
+    out, _ = first_run
+    refuse(
+        *("reconstruct", toy_scene, "--preset", "toy", "--store", store_url),
+        *("--out", out, "--seed", 7),
+        because="another run",
+    )
+
+
+def test_a_finished_folder_is_found_finished(first_run, toy_scene, store_url):
+    out, _ = first_run
+    run = mocoflow(
+        *("reconstruct", toy_scene, "--preset", "toy", "--store", store_url, "--out", out)
+    )
+    assert run.returncode == 0, run.stderr
+    assert "Already finished" in run.stdout
+
+
+def test_a_scene_that_is_not_there_is_refused(tmp_path):
+    refuse("reconstruct", tmp_path / "nothing", "--out", tmp_path / "out", because="scene.json")
+
+
+def test_a_preset_that_does_not_exist_is_refused(toy_scene, tmp_path):
+    refuse(
+        "reconstruct", toy_scene, "--preset", "fats", "--out", tmp_path / "out", because="fast, toy"
+    )
+
+
+def test_a_matrix_that_is_no_rotation_is_refused(scene, describe, tmp_path):
+    describe(lambda d: d["cameras"]["cam00"]["R"][0].reverse())
+    refuse("reconstruct", scene, "--out", tmp_path / "out", because="rotation")
+
+
+def test_a_missing_mesh_file_is_refused(toy_scene, tmp_path):
+    refuse(
+        *("reconstruct", toy_scene, "--out", tmp_path / "out", "--meshes", tmp_path / "no.npz"),
+        because="--meshes",
+    )
+
+
+@pytest.fixture
+def refuse_inside_the_flow(reconstruct, tmp_path):
+    """Runs the flow in this process, which is quicker: the same error, before it gets printed."""
+    from mocoflow_core.errors import InputError
+
+    def run(scene, because, **changes):
+        store = tmp_path / "fresh"
+        with pytest.raises(InputError, match=because):
+            reconstruct(scene, tmp_path / "out", store=str(store), **changes)
+        assert not list(store.glob("*/*/manifest.json")) or because
+
+    return run
+
+
+def without_masks_and_background(scene, describe):
+    def edit(description):
+        for part in ("masks", "background"):
+            description["cameras"]["cam00"].pop(part, None)
+
+    describe(edit)
+
+
+def with_a_mask_of_another_size(scene, describe):
+    Image.new("L", (16, 16), 255).save(scene / "masks" / "cam00" / "000002.png")
+
+
+def with_a_missing_frame(scene, describe):
+    (scene / "frames" / "cam00" / "000003.png").unlink()
+
+
+def with_a_video_that_cannot_be_decoded(scene, describe):
+    (scene / "broken.mp4").write_bytes(b"no video at all" * 100)
+    describe(lambda d: d["cameras"]["cam00"].update(frames="broken.mp4"))
+
+
+def edit_meshes(scene, edit):
+    with np.load(scene / "meshes.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    edit(arrays)
+    np.savez(scene / "meshes.npz", **arrays)
+
+
+def with_meshes_with_nan(scene, describe):
+    edit_meshes(scene, lambda a: a["vertices"].__setitem__((0, 0, 0), np.nan))
+
+
+def with_meshes_of_another_frame_count(scene, describe):
+    def edit(arrays):
+        arrays["vertices"] = arrays["vertices"][:3]
+        arrays["frame_indices"] = arrays["frame_indices"][:3]
+
+    edit_meshes(scene, edit)
+
+
+def with_meshes_in_millimetres(scene, describe):
+    edit_meshes(scene, lambda a: a.update(vertices=1000 * a["vertices"]))
+
+
+@pytest.mark.parametrize(
+    ("damage", "because"),
+    [
+        (without_masks_and_background, "masks or a background"),
+        (with_a_mask_of_another_size, "16"),
+        (with_a_missing_frame, "000003|frame 3|3"),
+        (with_a_video_that_cannot_be_decoded, "broken.mp4"),
+        (with_meshes_with_nan, "finite|NaN"),
+        (with_meshes_of_another_frame_count, "frame"),
+        (with_meshes_in_millimetres, "millimet|mm"),
+    ],
+)
+def test_a_damaged_scene_is_bad_input(damage, because, scene, describe, refuse_inside_the_flow):
+    damage(scene, describe)
+    refuse_inside_the_flow(scene, because)
+
+
+def test_bad_input_found_by_a_stage_ends_with_exit_code_2(scene, describe, tmp_path):
+    with_meshes_in_millimetres(scene, describe)
+    refuse(
+        *("reconstruct", scene, "--preset", "toy", "--out", tmp_path / "out"),
+        *("--store", tmp_path / "store"),
+        because="m",
+    )
+
+
+def test_the_same_render_command_gives_the_same_picture(first_run, tmp_path):
+    out, _ = first_run
+    pictures = [tmp_path / f"{number}.png" for number in range(2)]
+    for picture in pictures:
+        command = ("render", out, "--camera", "cam01", "--times", "0.11", "--out", picture)
+        assert mocoflow(*command).returncode == 0
+    assert pictures[0].read_bytes() == pictures[1].read_bytes()
+
+
+def test_a_rendered_frame_is_the_scored_view(first_run, tmp_path):
+    out, _ = first_run
+    done = mocoflow("render", out, "--camera", "cam01", "--frames", "3", "--out", tmp_path / "v")
+    assert done.returncode == 0, done.stderr
+    rendered = (tmp_path / "v" / "000003.png").read_bytes()
+    assert rendered == (out / "views" / "cam01" / "000003.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "because"),
+    [
+        ("--camera", "cam09", "cam01"),
+        ("--frames", "100", "in the clip"),
+        ("--frames", "one", "numbers"),
+        ("--background", "colour of the sky", "--background"),
+        ("--rotate", "1,2", "Three numbers"),
+    ],
+)
+def test_a_view_that_cannot_be_is_refused(first_run, tmp_path, option, value, because):
+    out, _ = first_run
+    refuse("render", out, option, value, "--out", tmp_path / "views", because=because)
+
+
+def test_rendering_a_folder_without_a_run_is_refused(tmp_path):
+    refuse("render", tmp_path, "--out", tmp_path / "views", because="run.json")

@@ -1,0 +1,23 @@
+"""The deployments that prefect.yaml names can be loaded and take the parameters they are given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from prefect.flows import load_flow_from_entrypoint
+
+ROOT = Path(__file__).parents[2]
+DEPLOYMENTS = yaml.safe_load((ROOT / "deployments" / "prefect.yaml").read_text())["deployments"]
+
+
+def test_both_deployments_are_there():
+    assert [deployment["name"] for deployment in DEPLOYMENTS] == ["full", "fast"]
+
+
+@pytest.mark.parametrize("deployment", DEPLOYMENTS, ids=lambda d: d["name"])
+def test_a_deployment_loads_and_its_parameters_are_valid(deployment):
+    flow = load_flow_from_entrypoint(deployment["entrypoint"])
+    assert flow.name == "mocoflow"
+    flow.validate_parameters(deployment["parameters"])
