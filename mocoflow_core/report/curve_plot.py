@@ -150,7 +150,8 @@ def _level(axes: Axes, metric: str, value: float | None) -> None:
 
 def _shade(axes: Axes, spans: Sequence[StageSpan], first_s: float, last_s: float) -> None:
     """Bands behind the curve; the time axis begins shortly before what can be seen of them."""
-    begin = max(min([first_s, *(span.end_s for span in spans if span.end_s > 0)]) * 0.6, 1e-2)
+    earliest = min([first_s, *(span.end_s for span in spans if span.end_s > 0)])
+    begin = max(0.6 * earliest, 0.02 * first_s, 1e-2)
     for span, colour in zip(spans, _colours(spans), strict=True):
         if span.end_s > begin:
             axes.axvspan(max(span.start_s, begin), span.end_s, color=colour, alpha=0.55, lw=0)

@@ -20,6 +20,8 @@ LARGEST_DIFFERENCE = 0.5
 # Tried from large to small until all pictures together fit.
 SIDES_PX = (640, 480, 360, 280, 200, 140, 96)
 WEBP_QUALITY = 82
+# WebP halves the resolution of colours, which smears the edges of a smaller picture.
+LEAST_SIDE_PX = 240
 
 
 def read_picture(path: Path) -> Picture:
@@ -29,13 +31,14 @@ def read_picture(path: Path) -> Picture:
 
 
 def fitted(picture: Picture, side_px: int) -> Picture:
-    """The picture, made smaller if a side is longer than ``side_px``."""
-    scale = side_px / max(picture.shape[:2])
-    if scale >= 1.0:
+    """The picture with its longer side at most ``side_px``, and not tiny if that allows it."""
+    longer = max(picture.shape[:2])
+    wanted = min(max(longer, LEAST_SIDE_PX), side_px)
+    if wanted == longer:
         return picture
-    height, width = (max(round(scale * size), 1) for size in picture.shape[:2])
-    smaller = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
-    return np.asarray(smaller, np.uint8)
+    height, width = (max(round(wanted / longer * size), 1) for size in picture.shape[:2])
+    method = cv2.INTER_AREA if wanted < longer else cv2.INTER_CUBIC
+    return np.asarray(cv2.resize(picture, (width, height), interpolation=method), np.uint8)
 
 
 def difference_picture(picture: Picture, reference: Picture) -> Picture:

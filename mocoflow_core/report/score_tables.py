@@ -90,11 +90,18 @@ def repairs(rows: Sequence[ScoreRow], method: str) -> list[Repair]:
             continue
         old = float(np.nanmedian(before)) if before else float("nan")
         new = float(np.nanmedian(after)) if after else float("nan")
-        change = f"{100 * (new - old) / old:+.0f} %" if before and after and old > 0 else ""
+        change = _change(old, new, label)
         found.append(
             Repair(label.title, label.with_unit(old), label.with_unit(new), change, new < old)
         )
     return found
+
+
+def _change(old: float, new: float, label: MetricLabel) -> str:
+    """The change in per cent; empty where the table's digits show none, or no error before."""
+    if label.text(old) == label.text(new) or float(label.text(0.0)) == round(old, label.digits):
+        return ""
+    return f"{100 * (new - old) / old:+.0f} %" if np.isfinite(old + new) else ""
 
 
 def headlines(rows: Sequence[ScoreRow], method: str, train_camera: str) -> list[Headline]:

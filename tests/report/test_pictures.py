@@ -17,14 +17,16 @@ def test_equal_pictures_differ_in_white_and_larger_differences_are_darker() -> N
     assert levels == sorted(levels, reverse=True)
 
 
-def test_small_pictures_are_kept_and_large_ones_keep_their_shape() -> None:
+def test_pictures_keep_their_shape_when_they_are_fitted() -> None:
     picture = np.zeros((300, 100, 3), np.uint8)
     assert fitted(picture, 300) is picture
     assert fitted(picture, 150).shape == (150, 50, 3)
+    assert fitted(picture[:120, :40], 300).shape == (240, 80, 3)
+    assert fitted(picture[:120, :40], 60).shape == (60, 20, 3)
 
 
 def test_pictures_shrink_until_they_fit_together() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (4, 200, 200, 3), dtype=np.uint8)
     free, tight = webps_within(noise, 10**9), webps_within(noise, 60_000)
-    assert Image.open(io.BytesIO(free[0])).size == (200, 200)
+    assert Image.open(io.BytesIO(free[0])).size == (240, 240)
     assert sum(map(len, tight)) <= 60_000

@@ -52,6 +52,18 @@ def test_errors_of_the_body_are_compared_by_their_medians() -> None:
     assert repair.better
 
 
+def test_no_change_is_claimed_against_an_error_of_zero_or_below_the_digits() -> None:
+    exact = score("posed_mesh", "cam00", "surface_mm", 1e-6)
+    assert (
+        repairs(exact + score("mocoflow", "cam00", "surface_mm", 0.8), "mocoflow")[0].change == ""
+    )
+    before = score("posed_mesh", "cam00", "surface_mm", 12.01)
+    assert (
+        repairs(before + score("mocoflow", "cam00", "surface_mm", 12.02), "mocoflow")[0].change
+        == ""
+    )
+
+
 def test_key_numbers_are_of_held_out_cameras_and_never_of_the_train_camera() -> None:
     numbers = {number.title: number for number in headlines(ROWS, "mocoflow", "cam00")}
     assert numbers["PSNR, person"].value == "22.00"
