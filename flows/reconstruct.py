@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import perf_counter
 from typing import Literal
 
 from prefect import flow
@@ -49,6 +50,7 @@ def reconstruct(
         settings: single fields, such as ``schedule.fine_steps=200``.
         store: folder or fsspec address of the artifact store.
     """
+    start = perf_counter()
     request = Request(
         scene_path=scene,
         out=out,
@@ -96,8 +98,10 @@ def reconstruct(
     )
 
     stages = (clip, given, inspection, bodies, plan, density, motion, trained)
-    facts = describe_run(clip, evaluation, trained, scores, stages)
-    about = Aside(folder.begun.model_copy(update=facts).model_dump(mode="json"))
+    stages += (evaluation, views, scores)
+    facts = describe_run(clip, evaluation, trained, scores, stages, perf_counter() - start)
+    known = folder.begun.model_copy(update=facts)
+    about = Aside(known.model_dump(mode="json", exclude_defaults=True))
     report = write_report(where, about, clip, evaluation, plan, trained, views, scores)
 
     rendered = where.folder(views)
@@ -109,8 +113,6 @@ def reconstruct(
     if views.summary["views"]:
         folder.take(rendered / "mocoflow" / "views", "views")
         folder.take(rendered / "mocoflow" / "opacity", "opacity")
-    record = folder.finish(
-        {**facts, "stages": records((*stages, evaluation, views, scores, report))}
-    )
-    show_in_prefect(record)
+    record = folder.finish({**facts, "stages": records((*stages, report))})
+    show_in_prefect(record, where.folder(report) / "report.html")
     return record

@@ -86,6 +86,8 @@ class Request(BaseModel):
             seed=self.seed,
             configuration=self.configuration.model_dump(mode="json"),
             store=self.store.url,
+            license=self.scene.description.license,
+            attribution=self.scene.description.attribution,
         )
         return RunFolder.claim(self.out, begun)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import base64
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from prefect.artifacts import create_markdown_artifact, create_table_artifact
@@ -26,10 +28,11 @@ def describe_run(
     evaluation: EvaluationArtifact,
     trained: SceneArtifact,
     scores: ScoresArtifact,
-    stages: Iterable[Artifact],
+    stages: Sequence[Artifact],
+    elapsed_s: float,
 ) -> dict[str, Any]:
     """The fields of ``run.json`` that are known once all is scored."""
-    stages = tuple(stages)
+    worked_s = sum(stage.wall_s for stage in records(stages) if not stage.cached)
     camera = {**clip.summary["camera"]}
     train_camera = camera.pop("name")
     return {
@@ -37,6 +40,7 @@ def describe_run(
         "train_camera": train_camera,
         "capture": {name: clip.summary[name] for name in CAPTURE},
         "cameras": {train_camera: camera, **evaluation.summary["cameras"]},
+        "overhead_s": max(elapsed_s - worked_s, 0.0),
         "stages": records(stages),
         "scores": scores.summary["mean"],
         "warnings": tuple(dict.fromkeys(w for stage in stages for w in stage.warnings)),
@@ -58,17 +62,22 @@ def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
     )
 
 
-def show_in_prefect(record: RunRecord) -> None:
-    """The scores as a table, and where the report lies."""
+def show_in_prefect(record: RunRecord, report: Path) -> None:
+    """On the run's page: the scores, the error curve, the stages and where the report lies."""
     rows = [
         {"method": method, "camera": camera, **metrics}
         for method, cameras in record.scores.items()
         for camera, metrics in cameras.items()
     ]
     create_table_artifact(rows, key="scores", description=f"Mean scores of {record.scene}")
-    lines = [f"# {record.scene}", "", "| stage | seconds | CPU seconds | cached |", "|-|-|-|-|"]
+    lines = [f"# {record.scene}", "", f"`{report}`", ""]
+    picture = report.with_name("error_curve.png")
+    if picture.exists():
+        content = base64.b64encode(picture.read_bytes()).decode()
+        lines += [f"![error against time](data:image/png;base64,{content})", ""]
+    lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [
-        f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'yes' if s.cached else ''} |"
+        f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'from the store' if s.cached else ''} |"
         for s in record.stages
     ]
-    create_markdown_artifact("\n".join(lines), key="report", description="Stages of the run")
+    create_markdown_artifact("\n".join(lines), key="report", description=f"Run on {record.scene}")

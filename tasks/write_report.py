@@ -13,6 +13,7 @@ from mocoflow_core.artifacts import (
     ScoresArtifact,
     ViewsArtifact,
 )
+from mocoflow_core.report.curve_picture import write_curve_picture
 from mocoflow_core.report.inputs import ReportInputs
 from mocoflow_core.report.page import write_report as write
 from tasks.stage import Aside, Stage, Summary, stage
@@ -33,7 +34,7 @@ def write_report(
 ) -> Summary:
     """Input beside novel view, held-out views beside their photographs, scores, omissions, times.
 
-    Output: ``report.html``. A few seconds.
+    Output: ``report.html``, and ``error_curve.png`` for Prefect's pages. A few seconds.
     """
     rendered = work.open(views)
     inputs = ReportInputs(
@@ -48,8 +49,10 @@ def write_report(
         novel_camera=str(views.summary["side_view"]),
         novel_view=rendered / "side",
         turntable=rendered / "turntable.mp4",
-        warnings=[str(warning) for warning in run.values["warnings"]],
+        warnings=[str(warning) for warning in run.values.get("warnings", ())],
         guard_events=[str(event) for event in trained.summary["events"]],
     )
     write(inputs, work.folder / "report.html")
-    return {}
+    picture = work.folder / "error_curve.png"
+    write_curve_picture(inputs.curve, run.values["stages"], inputs.method, picture)
+    return {"picture": picture.exists()}

@@ -29,7 +29,11 @@ class StageRecord(BaseModel):
 
 
 class RunRecord(BaseModel):
-    """The content of ``run.json``. ``request`` stands for scene, settings and seed."""
+    """The content of ``run.json``.
+
+    ``request`` stands for scene, settings and seed; ``overhead_s`` is what the run took besides
+    its stages.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -41,6 +45,9 @@ class RunRecord(BaseModel):
     seed: int
     configuration: dict[str, JsonValue]
     store: str
+    license: str = ""
+    attribution: str = ""
+    overhead_s: float = 0.0
     machine: dict[str, JsonValue] = {}
     stages: tuple[StageRecord, ...] = ()
     train_camera: str = ""

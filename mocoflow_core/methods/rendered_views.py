@@ -76,6 +76,19 @@ class PosedMeshRenderer:
         return self._mesh.render(camera, self._vertices[frame_index])
 
 
+class Pictures:
+    """Views that were rendered before, read from their files."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def render(self, camera: Camera, frame_index: int) -> tuple[Image, Image]:
+        name = f"{camera.name}/{frame_index:06d}.png"
+        rgb = read_picture(self._folder / "views" / name)
+        opacity = read_picture(self._folder / "opacity" / name)
+        return rgb.astype(np.float32) / 255.0, opacity.astype(np.float32) / 255.0
+
+
 def load_clips(folder: Path) -> list[Clip]:
     """The evaluation cameras' clips, a folder each, by name."""
     return [Clip.load(path) for path in sorted(folder.iterdir()) if path.is_dir()]
@@ -102,10 +115,3 @@ def render_views(
         write_picture(folder / "views" / view.name, as_bytes(rgb))
         write_picture(folder / "opacity" / view.name, as_bytes(opacity))
         progress((number + 1) / len(views), view.name)
-
-
-def read_view(folder: Path, view: ScoredView) -> tuple[Image, Image]:
-    """A rendered view as ``render_views`` left it: rgb and opacity in [0, 1]."""
-    rgb = read_picture(folder / "views" / view.name)
-    opacity = read_picture(folder / "opacity" / view.name)
-    return rgb.astype(np.float32) / 255.0, opacity.astype(np.float32) / 255.0

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from mocoflow_core.methods.rendered_views import Progress, Renderer, ScoredView, read_view
+from mocoflow_core.methods.rendered_views import Progress, Renderer, ScoredView
 from mocoflow_core.metrics.crop import crop_around, crop_side
 from mocoflow_core.metrics.curve import CurveRow
 from mocoflow_core.metrics.score import EvaluationConfig, protocol, score_view
@@ -24,8 +23,10 @@ class Subject(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """A state of the optimisation that was kept, and its training clock."""
+    """A state that was kept, and its training clock."""
 
+    method: str
+    stage: str
     step: int
     wall_s: float
     cpu_s: float
@@ -36,15 +37,14 @@ def score_views(
     subject: Subject,
     method: str,
     views: Sequence[ScoredView],
-    folder: Path,
+    renderer: Renderer,
     configuration: EvaluationConfig,
 ) -> list[ScoreRow]:
-    """Scores of one method's pictures; the crop is the same for all methods."""
+    """Scores of one method's views; the crop is the same for all methods."""
     side = side_of(views, configuration)
     rows = []
     for view in views:
-        rgb, opacity = read_view(folder, view)
-        scores = _score(view, rgb, opacity, side, configuration)
+        scores = _score(view, renderer, side, configuration)
         rows += [
             ScoreRow(
                 subject.scene,
@@ -79,20 +79,15 @@ def error_curve(
     ]
     rows = []
     for number, moment in enumerate(moments):
-        scores = [
-            _score(
-                view, *moment.renderer.render(view.camera, view.frame_index), side, configuration
-            )
-            for view in drawn
-        ]
+        scores = [_score(view, moment.renderer, side, configuration) for view in drawn]
         for metric in scores[0]:
             value = float(np.mean([score[metric] for score in scores]))
             rows.append(
                 CurveRow(
                     subject.scene,
-                    "mocoflow",
+                    moment.method,
                     subject.seed,
-                    "optimise_scene",
+                    moment.stage,
                     moment.step,
                     moment.wall_s,
                     moment.cpu_s,
@@ -111,12 +106,9 @@ def side_of(views: Sequence[ScoredView], configuration: EvaluationConfig) -> int
 
 
 def _score(
-    view: ScoredView,
-    rgb: np.ndarray,
-    opacity: np.ndarray,
-    side: int,
-    configuration: EvaluationConfig,
+    view: ScoredView, renderer: Renderer, side: int, configuration: EvaluationConfig
 ) -> dict[str, float]:
+    rgb, opacity = renderer.render(view.camera, view.frame_index)
     mask = np.asarray(view.clip.masks[view.row])
     photograph = np.asarray(view.clip.frames[view.row])
     return score_view(rgb, opacity, photograph, mask, crop_around(mask, side), configuration)

@@ -10,6 +10,7 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.methods.rendered_views import (
+    Pictures,
     Progress,
     TrainedRenderer,
     load_clips,
@@ -57,7 +58,7 @@ def score_run(
     rows = [
         row
         for method in METHODS
-        for row in score_views(subject, method, views, folders.views / method, evaluating)
+        for row in score_views(subject, method, views, Pictures(folders.views / method), evaluating)
     ]
     truth_file = folders.evaluation / "truth.npz"
     rows += motion_rows(
@@ -70,7 +71,9 @@ def score_run(
         truth,
     )
     write_scores(rows, into / "scores.parquet")
-    moments = _kept_moments(folders.trained, renderer, clip, before)
+    given = Pictures(folders.views / "posed_mesh")
+    moments = [Moment("posed_mesh", "ingest_meshes", 0, before.wall, before.cpu, given)]
+    moments += _kept_moments(folders.trained, renderer, clip, before)
     curve = error_curve(subject, moments, views, evaluating, progress)
     write_curve(curve, into / "error_curve.parquet")
     return mean_scores(rows)
@@ -88,5 +91,6 @@ def _kept_moments(
         scene.share_bodies(final.scene)
         renderer = TrainedRenderer(scene, clip)
         clock = before + Seconds(entry["wall_s"], entry["cpu_s"])
-        moments.append(Moment(entry["step"], clock.wall, clock.cpu, renderer))
+        state = (entry["step"], clock.wall, clock.cpu, renderer)
+        moments.append(Moment("mocoflow", "optimise_scene", *state))
     return moments

@@ -49,7 +49,9 @@ def test_the_training_clock_of_the_curve_starts_after_the_preparation(first_run)
     out, record = first_run
     preparation = STAGES[:6]
     spent = sum(record.stage(name).wall_s for name in preparation)
-    assert min(row.wall_s for row in read_curve(out / "error_curve.parquet")) > spent
+    curve = read_curve(out / "error_curve.parquet")
+    assert min(row.wall_s for row in curve if row.method == "mocoflow") > spent
+    assert {row.method for row in curve} == {"mocoflow", "posed_mesh"}
 
 
 def test_a_second_run_computes_nothing_and_leaves_the_same(first_run, reconstruct, toy_scene):

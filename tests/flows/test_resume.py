@@ -14,7 +14,7 @@ from mocoflow_core.io.content_key import digest_file
 from mocoflow_core.io.store import Store
 
 ROOT = Path(__file__).parents[2]
-SETTINGS = ("schedule.coarse_steps=300", "schedule.checkpoint_every_s=0.1")
+SETTINGS = ("schedule.coarse_steps=120", "schedule.checkpoint_every_s=0.1")
 
 
 def started(scene, store, out):
