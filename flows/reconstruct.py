@@ -114,5 +114,5 @@ def reconstruct(
         folder.take(rendered / "mocoflow" / "views", "views")
         folder.take(rendered / "mocoflow" / "opacity", "opacity")
     record = folder.finish({**facts, "stages": records((*stages, report))})
-    show_in_prefect(record, where.folder(report) / "report.html")
+    show_in_prefect(record, out / "report.html", where.folder(report) / "error_curve.png")
     return record

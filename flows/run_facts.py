@@ -62,7 +62,7 @@ def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
     )
 
 
-def show_in_prefect(record: RunRecord, report: Path) -> None:
+def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
     """On the run's page: the scores, the error curve, the stages and where the report lies."""
     rows = [
         {"method": method, "camera": camera, **metrics}
@@ -71,7 +71,6 @@ def show_in_prefect(record: RunRecord, report: Path) -> None:
     ]
     create_table_artifact(rows, key="scores", description=f"Mean scores of {record.scene}")
     lines = [f"# {record.scene}", "", f"`{report}`", ""]
-    picture = report.with_name("error_curve.png")
     if picture.exists():
         content = base64.b64encode(picture.read_bytes()).decode()
         lines += [f"![error against time](data:image/png;base64,{content})", ""]
