@@ -72,11 +72,7 @@ def error_curve(
     if not views:
         return []
     side = side_of(views, configuration)
-    named = {(view.camera.name, view.frame_index): view for view in views}
-    drawn = [
-        named[name]
-        for name in draw_views(list(named), configuration.curve_views, configuration.seed)
-    ]
+    drawn = few_views(views, configuration)
     rows = []
     for number, moment in enumerate(moments):
         scores = [_score(view, moment.renderer, side, configuration) for view in drawn]
@@ -97,6 +93,13 @@ def error_curve(
             )
         progress((number + 1) / len(moments), f"error at step {moment.step}")
     return rows
+
+
+def few_views(views: Sequence[ScoredView], configuration: EvaluationConfig) -> list[ScoredView]:
+    """The small seeded draw that is affordable again and again."""
+    named = {(view.camera.name, view.frame_index): view for view in views}
+    drawn = draw_views(list(named), configuration.curve_views, configuration.seed)
+    return [named[name] for name in drawn]
 
 
 def side_of(views: Sequence[ScoredView], configuration: EvaluationConfig) -> int:

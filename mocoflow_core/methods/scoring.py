@@ -16,7 +16,8 @@ from mocoflow_core.methods.rendered_views import (
     load_clips,
     scored_views,
 )
-from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, score_views
+from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, few_views, score_views
+from mocoflow_core.methods.surface_errors import surface_rows
 from mocoflow_core.methods.truth_errors import TruthConfig, motion_rows
 from mocoflow_core.metrics.curve import write_curve
 from mocoflow_core.metrics.score import EvaluationConfig
@@ -60,16 +61,13 @@ def score_run(
         for method in METHODS
         for row in score_views(subject, method, views, Pictures(folders.views / method), evaluating)
     ]
+    meshes = MeshSequence.load(folders.bodies / "meshes.npz")
+    canonical = CanonicalDensity.load(folders.trained).vertices
     truth_file = folders.evaluation / "truth.npz"
-    rows += motion_rows(
-        subject,
-        renderer,
-        clip,
-        MeshSequence.load(folders.bodies / "meshes.npz"),
-        CanonicalDensity.load(folders.trained).vertices,
-        truth_file if truth_file.exists() else None,
-        truth,
-    )
+    known = truth_file if truth_file.exists() else None
+    rows += motion_rows(subject, renderer, clip, meshes, canonical, known, truth)
+    if known is not None:
+        rows += surface_rows(subject, renderer, meshes, few_views(views, evaluating), known)
     write_scores(rows, into / "scores.parquet")
     given = Pictures(folders.views / "posed_mesh")
     moments = [Moment("posed_mesh", "ingest_meshes", 0, before.wall, before.cpu, given)]
