@@ -46,7 +46,8 @@ def _coefficients(squared_angle: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def _cross(a: Tensor, b: Tensor) -> Tensor:
-    return torch.linalg.cross(a, b, dim=-1)
+    # linalg.cross broadcasts sizes, but wants the same number of axes.
+    return torch.linalg.cross(*torch.broadcast_tensors(a, b), dim=-1)
 
 
 def transform_points(twist: Tensor, points: Tensor) -> Tensor:
@@ -77,7 +78,9 @@ def transform_points(twist: Tensor, points: Tensor) -> Tensor:
 
 def exp_se3(twist: Tensor) -> tuple[Tensor, Tensor]:
     """The exponential map as rotation matrix (..., 3, 3) and translation (..., 3)."""
+    omega, v = twist.split(3, -1)
     basis = torch.eye(3, dtype=twist.dtype, device=twist.device)
-    translation = transform_points(twist, torch.zeros_like(twist[..., :3]))
-    columns = transform_points(twist[..., None, :], basis) - translation[..., None, :]
-    return columns.transpose(-1, -2), translation
+    # Turned without translation: subtracting a long one would cost digits.
+    turning = torch.cat([omega, torch.zeros_like(v)], -1)
+    columns = transform_points(turning[..., None, :], basis)
+    return columns.transpose(-1, -2), transform_points(twist, torch.zeros_like(v))
