@@ -1,0 +1,14 @@
+"""Torch on one thread: tests that repeat to the last bit and leave the other core alone."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
