@@ -21,6 +21,8 @@ Array = NDArray[np.float32]
 # Pulls rotations that a neighbourhood does not determine (flat, line-like or tiny ones) towards
 # the rotation of the whole body; relative to the neighbourhood's own extent, so free of units.
 _GLOBAL_PULL = 1e-3
+# Sum of squares (m^2) below which a neighbourhood is one point and its shape is rounding.
+_ONE_POINT = 1e-8
 
 _FILE = "controls.safetensors"
 _PARTS = ("times", "canonical", "observed", "rotations", "surface", "surface_control")
@@ -161,7 +163,7 @@ def best_rotation(source: Array, target: Array, fallback: Array | None = None) -
     covariance = np.swapaxes(target, -1, -2) @ source
     if fallback is not None:
         extent = (source * source).sum((-1, -2))[..., None, None]
-        covariance = covariance + _GLOBAL_PULL * extent * fallback
+        covariance = covariance + _GLOBAL_PULL * np.maximum(extent, _ONE_POINT) * fallback
     u, _, vt = np.linalg.svd(covariance.astype(np.float64))
     handed = np.ones(u.shape[:-1])
     handed[..., -1] = np.sign(np.linalg.det(u @ vt))
