@@ -27,7 +27,7 @@ class CanonicalConfig(ConfigurationPart):
     channels: int = Field(8, ge=1, description="features per level")
     hidden: int = Field(32, ge=1, description="width of the two networks")
     appearance_width: int = Field(8, ge=1, description="length of the per-image code (paper: 8)")
-    sharpness_m: float = Field(0.01, gt=0, description="width of the density's edge at the start")
+    sharpness_m: float = Field(0.006, gt=0, description="width of the density's edge at the start")
     largest_offset_m: float = Field(0.06, gt=0, description="how far the surface may move")
     margin_m: float = Field(0.02, ge=0, description="features beyond the shell, for moved samples")
 
@@ -40,7 +40,7 @@ class CanonicalGrid(nn.Module):
         prior: SignedDistancePrior,
         grids: list[SparseGrids],
         configuration: CanonicalConfig,
-        light: FixedLight | None,
+        light: FixedLight,
     ) -> None:
         super().__init__()
         self.prior = prior
@@ -93,10 +93,8 @@ class CanonicalGrid(nn.Module):
         """
         head = self.geometry(self.features(points))
         offset = self.offset_m(head[:, 0])
-        logits = self.colour(torch.cat([head[:, 1:], appearance], -1))
-        if self.light is not None:
-            logits = logits + self.light(facing)
-        return torch.sigmoid(logits), self.density(self.prior(points) - offset), offset
+        unshaded = torch.sigmoid(self.colour(torch.cat([head[:, 1:], appearance], -1)))
+        return unshaded * self.light(facing), self.density(self.prior(points) - offset), offset
 
     def density(self, signed_distance: Tensor) -> Tensor:
         """Density (1/m) from a signed distance (m): Laplace's distribution function over width.

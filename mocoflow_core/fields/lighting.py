@@ -1,7 +1,7 @@
 """Shading by a light that stands still while the person moves.
 
-A canonical point that turns away from the light darkens. Without this the darkening would have to
-go into colour or density, and would be wrong from every other side.
+A point of the skin that turns away from the light darkens. Without this the darkening would have
+to go into colour or density, and would be wrong from every other side.
 """
 
 from __future__ import annotations
@@ -9,24 +9,24 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-_TERMS = 8  # real spherical harmonics of degree 1 and 2; degree 0 belongs to the colour
+_GAMMA = 2.2  # of the sRGB encoding, near enough for a change of brightness
 
 
 class FixedLight(nn.Module):
-    """Brightness by the direction that a surface faces, in logits of the colour.
+    """Brightness ``1 + b . normal`` in linear light, scaled to at most one.
 
-    Starts at no shading. Source: irradiance is a degree-2 spherical harmonic of the normal to
-    within a few percent (Ramamoorthi and Hanrahan 2001).
+    ``b`` is measured before training (``body/light.py``), because pixels at grazing sights would
+    pull a learned one to the wrong side. Zero leaves colours as they are.
     """
 
-    def __init__(self) -> None:
+    light: Tensor
+
+    def __init__(self, light: tuple[float, float, float]) -> None:
         super().__init__()
-        self.coefficients = nn.Parameter(torch.zeros(_TERMS, 3))
+        self.register_buffer("light", torch.tensor(light), persistent=False)
+        self.brightest = 1.0 + float(self.light.norm())
 
     def forward(self, facing: Tensor) -> Tensor:
-        """Unit normals in world space (P, 3) -> change of the colour's logits (P, 3)."""
-        x, y, z = facing.unbind(-1)
-        terms = torch.stack(
-            [x, y, z, x * y, y * z, x * z, x * x - y * y, 3.0 * z * z - 1.0], -1
-        )
-        return terms @ self.coefficients
+        """Unit normals in world space (P, 3) -> factor on sRGB-encoded colours (P, 1) in (0, 1]."""
+        brightness = (1.0 + facing @ self.light) / self.brightest
+        return brightness.clamp_min(1e-3)[:, None] ** (1.0 / _GAMMA)

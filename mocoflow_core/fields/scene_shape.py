@@ -32,18 +32,19 @@ class SceneShape(ConfigurationPart):
     shell_width_m: float = Field(gt=0)
     inner_depth_m: float = Field(gt=0)
     step_m: float = Field(gt=0, description="distance between samples")
-    light: bool = Field(description="a fixed light shades by the direction that surfaces face")
+    light: tuple[float, float, float] = Field(
+        (0.0, 0.0, 0.0), description="linear brightness is 1 + light . normal, world space"
+    )
 
     def build(self, prior: SignedDistancePrior) -> SceneField:
         """Fields with fresh weights, drawn from torch's global generator."""
         outside = self.shell_width_m + self.canonical.margin_m
         grids = nested_grids(prior, outside, self.inner_depth_m, self.canonical)
-        light = FixedLight() if self.light else None
         centre, radius = _middle(prior)
         motion = HybridMotion(
             torch.tensor(self.times, dtype=torch.float64), centre, radius, self.motion.residual
         )
-        return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, light))
+        return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, FixedLight(self.light)))
 
 
 def _middle(prior: SignedDistancePrior) -> tuple[Tensor, float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from mocoflow_core.body.light import LightConfig, measure_light
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.scene import Scene
@@ -28,6 +30,7 @@ class PlanConfig(ConfigurationPart):
     motion_consensus: Force = "auto"
     fit_motion_steps: Force = "auto"
     appearance_codes: Force = "auto"
+    fixed_light: Force = "auto"
     trusted_overlap: float = Field(
         0.6, ge=0, le=1, description="Silhouette overlap from which a given location is trusted."
     )
@@ -39,6 +42,10 @@ class PlanConfig(ConfigurationPart):
     )
     constant_brightness: float = Field(
         0.02, ge=0, description="Brightness of the person that changes less than this is constant."
+    )
+    light: LightConfig = LightConfig()
+    faint_light: float = Field(
+        0.05, ge=0, description="A light that changes brightness by less than this is left out."
     )
     narrowest_shell_m: float = Field(0.03, gt=0, description="Least shell around the body, metres.")
     widest_shell_m: float = Field(0.15, gt=0, description="Largest shell around the body, metres.")
@@ -52,6 +59,7 @@ class ScenePlan(BaseModel):
     decisions: tuple[Decision, ...]
     canonical_frame: int  # source number
     shell_width_m: float  # density can be so far from the body
+    light: tuple[float, float, float]  # linear brightness is 1 + light . normal, world space
 
     def needs(self, name: str) -> bool:
         """Whether the named thing is to be done. Raises KeyError for an unknown name."""
@@ -73,6 +81,8 @@ def plan_scene(
     agreement = mask_agreement(clip, posed)
     moves = _moves(clip, posed, configuration)
     residual = _residual(agreement, moves.needed, configuration)
+    light = measure_light(clip, posed, configuration.light)
+    lit = _light(light, configuration)
     decisions = (
         _background(inspection).forced(configuration.background_extraction),
         _segmentation(inspection).forced(configuration.mask_segmentation),
@@ -82,6 +92,7 @@ def plan_scene(
         _consensus(residual).forced(configuration.motion_consensus),
         _fit_steps(residual, agreement, configuration),
         _appearance(clip, posed, configuration),
+        lit,
     )
     trained = np.flatnonzero(~clip.held_out)
     spread = closeness(posed.at(clip.frame_indices[trained]))
@@ -92,6 +103,7 @@ def plan_scene(
         shell_width_m=float(
             np.clip(shell, configuration.narrowest_shell_m, configuration.widest_shell_m)
         ),
+        light=tuple((light if lit.needed else np.zeros(3)).tolist()),
     )
 
 
@@ -238,3 +250,18 @@ def _appearance(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> 
         threshold=configuration.constant_brightness,
         saves="a code for each frame and the overfitting it invites",
     ).forced(configuration.appearance_codes)
+
+
+def _light(light: NDArray[np.float64], configuration: PlanConfig) -> Decision:
+    strength = float(np.linalg.norm(light))
+    needed = strength > configuration.faint_light
+    return Decision(
+        name="fixed_light",
+        needed=needed,
+        reason="the person gets brighter when turning to one side"
+        if needed
+        else "the person is as bright from every side",
+        evidence={"strength": strength, "x": light[0], "y": light[1], "z": light[2]},
+        threshold=configuration.faint_light,
+        saves="shading by the direction that the skin faces",
+    ).forced(configuration.fixed_light)

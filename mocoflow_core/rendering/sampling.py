@@ -16,7 +16,7 @@ from mocoflow_core.geometry.rays import Rays
 class SamplingConfig(ConfigurationPart):
     """Where rays are sampled."""
 
-    step_m: float = Field(0.015, gt=0, description="distance between samples, metres")
+    step_m: float = Field(0.01, gt=0, description="distance between samples, metres")
     inner_depth_m: float = Field(
         0.04, gt=0, description="samples deeper under the canonical skin are never visible"
     )
