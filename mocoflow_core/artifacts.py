@@ -62,12 +62,6 @@ class LocationArtifact(Artifact):
 class PlanArtifact(Artifact):
     stage = "plan_scene"
 
-    def needs(self, decision: str) -> bool:
-        """Whether the plan keeps a stage; an unknown name is a mistake of ours."""
-        needed = self.summary["needed"]
-        assert isinstance(needed, dict)
-        return bool(needed[decision])
-
 
 class DensityArtifact(Artifact):
     stage = "pretrain_density"

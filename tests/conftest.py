@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
+import tempfile
+
+import pytest
+
+# Nothing that a user has is read or written: neither their cache nor their Prefect.
+HOME = tempfile.mkdtemp(prefix="mocoflow-tests-")
+atexit.register(shutil.rmtree, HOME, ignore_errors=True)
 
 # Prefect reads its settings when it is imported.
 os.environ |= {
+    "XDG_CACHE_HOME": f"{HOME}/cache",
+    "PREFECT_HOME": f"{HOME}/prefect",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
     "DO_NOT_TRACK": "1",
     "PREFECT_LOGGING_TO_API_ENABLED": "false",
     "PREFECT_LOGGING_LEVEL": "CRITICAL",
     "PREFECT_API_BLOCKS_REGISTER_ON_START": "false",
 }
-
-import pytest
 
 
 @pytest.fixture(scope="session")
