@@ -29,28 +29,42 @@ class Guard:
         self.allowed = allowed
         self.events: list[GuardEvent] = []
         self.rate_scale = 1.0
+        bad = self._not_finite()
+        if bad is not None:
+            raise TrainingDiverged(
+                f"cannot start: {bad} is not finite. Remove the checkpoint and start again."
+            )
         self.remember()
 
     def remember(self) -> None:
         """Take the present state as good, unless it is not finite."""
-        if all(bool(torch.isfinite(value).all()) for value in self.model.parameters()):
+        if self._not_finite() is None:
             self._weights = [value.detach().clone() for value in self.model.parameters()]
-            self._moments = [
-                {name: _copied(value) for name, value in state.items()}
-                for state in self.optimiser.state.values()
-            ]
+            self._moments = {
+                parameter: {name: _copied(value) for name, value in state.items()}
+                for parameter, state in self.optimiser.state.items()
+            }
 
     def problem(self, terms: dict[str, Tensor]) -> str | None:
-        """Name of the first non-finite loss or parameter gradient; None if all is well."""
+        """Name of the first non-finite loss, weight or gradient; None if all is well."""
         for name, value in terms.items():
             if not torch.isfinite(value.detach()):
                 return f"loss {name} is {value.item()}"
-        learned = [(n, p) for n, p in self.model.named_parameters() if p.grad is not None]
-        norms = torch._foreach_norm([parameter.grad for _, parameter in learned])
+        bad = self._not_finite()
+        return None if bad is None else f"{bad} is not finite"
+
+    def _not_finite(self) -> str | None:
+        """The first weight or gradient that is not finite."""
+        named = [(f"weight {n}", p.detach()) for n, p in self.model.named_parameters()]
+        named += [
+            (f"gradient of {n}", p.grad)
+            for n, p in self.model.named_parameters()
+            if p.grad is not None
+        ]
+        norms = torch._foreach_norm([value for _, value in named])
         if torch.isfinite(torch.stack(norms)).all():
             return None
-        bad = next(n for (n, _), norm in zip(learned, norms, strict=True) if not norm.isfinite())
-        return f"gradient of {bad} is not finite"
+        return next(n for (n, _), norm in zip(named, norms, strict=True) if not norm.isfinite())
 
     def refuse(self, step: int, what: str) -> None:
         """Go back to the last good state and halve the rate.
@@ -68,10 +82,10 @@ class Guard:
         with torch.no_grad():
             for parameter, good in zip(self.model.parameters(), self._weights, strict=True):
                 parameter.copy_(good)
-            for state, good in zip(self.optimiser.state.values(), self._moments, strict=False):
-                for name, value in good.items():
-                    if isinstance(value, Tensor):
-                        state[name].copy_(value)
+            # What had no moments yet has none again.
+            self.optimiser.state.clear()
+            for owner, moments in self._moments.items():
+                self.optimiser.state[owner] = {n: _copied(v) for n, v in moments.items()}
         self.rate_scale *= 0.5
 
 
