@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+import copy
+
+import pytest
+import torch
+from torch import nn
+
+from mocoflow_core.training.guard import Guard, TrainingDiverged
+
+
+class Run:
+    """A small network that learns a line, with a guard that watches it."""
+
+    def __init__(self, allowed: int = 3) -> None:
+        torch.manual_seed(0)
+        self.model = nn.Sequential(nn.Linear(2, 4), nn.Tanh(), nn.Linear(4, 1))
+        self.optimiser = torch.optim.Adam(self.model.parameters(), lr=0.05)
+        self.guard = Guard(self.model, self.optimiser, allowed)
+
+    def gradients(self, plant: float | None = None) -> dict[str, torch.Tensor]:
+        x = torch.linspace(-1, 1, 10)[:, None].expand(10, 2)
+        loss = ((self.model(x) - 2 * x[:, :1]) ** 2).mean()
+        self.optimiser.zero_grad()
+        loss.backward()
+        if plant is not None:
+            self.model[2].weight.grad[0, 1] = plant
+        return {"photometric": loss}
+
+    def steps(self, count: int) -> None:
+        for _ in range(count):
+            self.gradients()
+            self.optimiser.step()
+
+    def state(self) -> list[torch.Tensor]:
+        return [p.detach().clone() for p in self.model.parameters()]
+
+
+def same(first: list[torch.Tensor], second: list[torch.Tensor]) -> bool:
+    return all(torch.equal(ours, theirs) for ours, theirs in zip(first, second, strict=True))
+
+
+def test_a_healthy_step_has_no_problem():
+    run = Run()
+    assert run.guard.problem(run.gradients()) is None
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf, -torch.inf])
+def test_a_loss_that_is_not_finite_is_named(value):
+    run = Run()
+    terms = run.gradients() | {"consensus": torch.tensor(value)}
+    assert "consensus" in run.guard.problem(terms)
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+def test_a_gradient_that_is_not_finite_is_named(value):
+    run = Run()
+    problem = run.guard.problem(run.gradients(plant=value))
+    assert "gradient" in problem
+    assert "2.weight" in problem
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+def test_a_weight_that_is_not_finite_is_named_even_where_no_loss_sees_it(value):
+    run = Run()
+    terms = run.gradients()
+    with torch.no_grad():
+        run.model[0].weight[1, 0] = value
+    problem = run.guard.problem(terms)
+    assert "weight" in problem
+    assert "0.weight" in problem
+
+
+def test_frozen_parameters_without_gradients_are_no_problem():
+    run = Run()
+    run.model[0].requires_grad_(False)
+    run.optimiser.zero_grad(set_to_none=True)
+    assert run.guard.problem(run.gradients()) is None
+
+
+def test_a_refused_step_goes_back_to_the_last_good_weights_and_halves_the_rate():
+    run = Run()
+    run.steps(3)
+    run.guard.remember()
+    good = run.state()
+    run.steps(2)
+    run.guard.refuse(5, "loss photometric is nan")
+    assert same(run.state(), good)
+    assert run.guard.rate_scale == 0.5
+    assert [(event.step, event.what) for event in run.guard.events] == [
+        (5, "loss photometric is nan")
+    ]
+
+
+@pytest.mark.parametrize("before", [0, 3])
+def test_after_a_refusal_training_goes_on_as_from_the_good_state(before):
+    run = Run()
+    run.steps(before)
+    run.guard.remember()
+    expected = copy.deepcopy(run)
+    run.steps(4)
+    run.guard.refuse(before + 4, "gradient")
+    run.steps(5)
+    expected.steps(5)
+    # The optimiser's moments went back too, not only the weights.
+    assert same(run.state(), expected.state())
+
+
+def test_refusing_twice_goes_back_to_the_same_state():
+    run = Run(allowed=5)
+    run.steps(2)
+    run.guard.remember()
+    good = run.state()
+    for _ in range(2):
+        run.steps(3)
+        run.guard.refuse(0, "x")
+    assert same(run.state(), good)
+    assert run.guard.rate_scale == 0.25
+
+
+def test_a_bad_state_is_never_remembered():
+    run = Run()
+    run.steps(2)
+    run.guard.remember()
+    good = run.state()
+    with torch.no_grad():
+        run.model[0].bias.fill_(torch.nan)
+    run.guard.remember()
+    run.guard.refuse(2, "weight 0.bias is not finite")
+    assert same(run.state(), good)
+
+
+def test_a_bad_start_is_refused_in_words():
+    run = Run()
+    with torch.no_grad():
+        run.model[2].bias.fill_(torch.nan)
+    with pytest.raises(TrainingDiverged, match=r"2\.bias"):
+        Guard(run.model, run.optimiser, 3)
+
+
+def test_after_the_allowed_number_of_events_it_stops_and_says_what_and_where():
+    run = Run(allowed=3)
+    for step in range(3):
+        run.guard.refuse(step, "loss consensus is nan")
+    with pytest.raises(TrainingDiverged) as stopped:
+        run.guard.refuse(117, "gradient of canonical.tables.0 is not finite")
+    text = str(stopped.value)
+    assert "117" in text
+    assert "canonical.tables.0" in text
+    assert "schedule.rate" in text
+    assert len(run.guard.events) == 4
