@@ -80,16 +80,18 @@ class SparseGrids:
 
     def flat_nearest(self, points: Tensor, grid: Tensor) -> Tensor:
         """Index (P,) in ``node_map`` of the lattice point nearest to each point (P, 3)."""
-        return self._flat(torch.round(self._lattice(points, grid)).long(), grid)
+        nearest = torch.round(self._lattice(points, grid)).long()
+        return self._flat(nearest.clamp_min(0), grid)
 
     def corners(self, points: Tensor, grid: Tensor) -> tuple[Tensor, Tensor]:
         """Numbers (P, 8) and trilinear weights (P, 8) of the nodes around each point.
 
         Missing nodes get weight zero and the rest is scaled up to sum to one; a point with no
         node around it has all weights zero. Differentiable in ``points`` through the weights.
+        A point that is not finite gets weights that are not: whoever watches the loss sees it.
         """
         lattice = self._lattice(points, grid)
-        base = torch.minimum(lattice.detach().long(), self.shape[grid] - 2)
+        base = torch.minimum(lattice.detach().long(), self.shape[grid] - 2).clamp_min(0)
         far = lattice - base
         near = 1.0 - far
         (x0, y0, z0), (x1, y1, z1) = near.unbind(-1), far.unbind(-1)
