@@ -50,10 +50,13 @@ class TrainingPixels:
         self.farthest = torch.cat([shell.farthest for shell in shells])
         self.counts = torch.tensor([len(shell.pixels) for shell in shells])
         self.starts = torch.cumsum(self.counts, 0) - self.counts
+        # A person who has left the picture leaves a frame without candidates.
+        self.in_sight = self.counts.nonzero()[:, 0]
 
     def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
         """Rays of a few frames, uniform over frames and over each frame's candidate pixels."""
-        chosen = torch.randint(len(self.counts), (frames,), generator=generator)
+        draws = torch.randint(len(self.in_sight), (frames,), generator=generator)
+        chosen = self.in_sight[draws]
         row = chosen.repeat_interleave(-(-rays // frames))[:rays]
         place = torch.rand(rays, generator=generator, dtype=torch.float64)
         found = self.starts[row] + (place * self.counts[row]).long()
