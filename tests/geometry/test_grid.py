@@ -143,6 +143,18 @@ def test_gradients_reach_the_points_through_the_weights():
     )
 
 
+def test_points_that_are_no_numbers_are_seen_in_the_weights_and_crash_nothing():
+    sparse = grids([full((4, 4, 4))], [[0.0, 0.0, 0.0]])
+    points = torch.full((3, 3), torch.nan)
+    points[1:, 1:] = 0.6
+    points[2, 0] = torch.inf
+    one_grid = torch.zeros(3, dtype=torch.int64)
+    numbers, weights = sparse.corners(points, one_grid)
+    assert ((numbers >= 0) & (numbers < 64)).all()
+    assert torch.isnan(weights[:2]).all(-1).tolist() == [True, True]
+    assert sparse.flat_nearest(points, one_grid).min() >= 0
+
+
 def test_no_points_are_no_error():
     sparse = grids([full((3, 3, 3))], [[0.0, 0.0, 0.0]])
     table = torch.ones(27, 2, requires_grad=True)
