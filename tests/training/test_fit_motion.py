@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from mocoflow_core.fields.canonical_density import CanonicalDensity
+from mocoflow_core.training.fit_motion import MotionStart, fit_motion
+from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
+from tests.toy_training import MOTION, SHELL_M
+
+
+def test_the_motion_starts_at_the_mesh_s_own(prepared):
+    fit = prepared.motion.fit
+    # Limbs swing by 25 degrees about joints that are 0.06 wide; the lattice has 0.04.
+    assert fit.to_canonical_mm < 2
+    assert fit.to_observed_mm < 2
+    assert fit.round_trip_mm < 1
+
+
+def test_training_frames_alone_have_look_up_tables(prepared):
+    clip = prepared.clip
+    assert prepared.motion.body.times.tolist() == clip.times[~clip.held_out].tolist()
+    assert prepared.motion.controls.times.tolist() == clip.times.tolist()
+
+
+def test_the_saved_motion_is_the_same_motion(prepared, tmp_path):
+    prepared.motion.save(tmp_path)
+    loaded = MotionStart.load(tmp_path)
+    assert loaded.fit == prepared.motion.fit
+    assert np.array_equal(loaded.controls.observed, prepared.motion.controls.observed)
+    ours, theirs = prepared.motion.body.tensors(), loaded.body.tensors()
+    assert ours.keys() == theirs.keys()
+    assert all(torch.equal(ours[name], theirs[name]) for name in ours)
+
+
+def test_meshes_are_joined_by_frame_number_not_by_row(prepared):
+    # The meshes of a longer recording, whose first rows belong to no frame of the clip.
+    meshes = prepared.meshes
+    padded = type(meshes)(
+        np.arange(-2, len(meshes.frame_indices), dtype=np.int32),
+        np.concatenate([meshes.vertices[:2] + 5.0, meshes.vertices]),
+        meshes.faces,
+        meshes.keypoint_regressor,
+    )
+    again = fit_motion(prepared.clip, padded, prepared.density, SHELL_M, MOTION)
+    assert np.array_equal(again.controls.observed, prepared.motion.controls.observed)
+
+
+def test_the_canonical_density_is_that_of_the_asked_frame(prepared):
+    meshes = prepared.meshes
+    frame = int(meshes.frame_indices[3])
+    density = pretrain_density(meshes, frame, DensityConfig(spacing_m=0.03))
+    assert np.array_equal(density.vertices, meshes.vertices[3])
+    on_surface = density.prior()(torch.from_numpy(meshes.vertices[3]))
+    # Linear between lattice points, rounded off at thin limbs.
+    assert float(on_surface.abs().median()) < 0.005
+    inside = density.prior()(torch.from_numpy(meshes.vertices[3].mean(0, keepdims=True)))
+    assert float(inside) == pytest.approx(-0.12, abs=0.05)
+
+
+def test_the_saved_density_is_the_same_density(prepared, tmp_path):
+    prepared.density.save(tmp_path)
+    loaded = CanonicalDensity.load(tmp_path)
+    for name in ("vertices", "faces", "lattice", "origin"):
+        assert np.array_equal(getattr(loaded, name), getattr(prepared.density, name))
+    assert loaded.spacing == prepared.density.spacing
