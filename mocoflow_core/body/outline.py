@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 from skimage.measure import find_contours
 
@@ -18,9 +19,10 @@ Mask = NDArray[np.bool_]
 
 # Blurs, in pixels, that make a mask's edge and its direction known between pixels.
 _EDGE_BLUR_PX = 0.7
-_DIRECTION_BLUR_PX = 2.0
-# A body's edge so near the border of its own silhouette is its outline, not a limb before a limb.
-_RIM_PX = 1.6
+_DIRECTION_BLUR_PX = 1.2
+# Where the body's own blurred silhouette covers more, an edge is not outline but lies before it:
+# the outline itself is covered by half, a point one pixel inside by 0.92.
+_RIM_COVERAGE = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +35,8 @@ class MaskOutline:
     @classmethod
     def of(cls, mask: Mask, most: int) -> MaskOutline:
         """At most about ``most`` points, evenly along the edge."""
-        coverage = mask.astype(np.float32)
-        edge = cv2.GaussianBlur(coverage, (0, 0), _EDGE_BLUR_PX, borderType=cv2.BORDER_REPLICATE)
-        smooth = cv2.GaussianBlur(
-            coverage, (0, 0), _DIRECTION_BLUR_PX, borderType=cv2.BORDER_REPLICATE
-        )
-        contours = find_contours(edge, 0.5)
+        smooth = _blurred(mask, _DIRECTION_BLUR_PX)
+        contours = find_contours(_blurred(mask, _EDGE_BLUR_PX), 0.5)
         if not contours:
             return cls(np.zeros((0, 2)), np.zeros((0, 2)))
         points = np.concatenate(contours)[:, ::-1]
@@ -95,17 +93,22 @@ class EdgeTopology:
         projected = middles @ camera.K.T
         pixels = projected[:, :2] / np.maximum(projected[:, 2:], NEAR_M)
         outward = (_unit(normals[beside[:, 0]]) + _unit(normals[beside[:, 1]]))[:, :2]
-        rim = _distance_inside(silhouette(vertices, self.faces.astype(np.int32), camera))
-        cell = np.floor(pixels).astype(np.int64)
-        size = np.array([camera.width, camera.height])
-        inside = ((cell >= 1) & (cell < size - 1)).all(axis=1) & (middles[:, 2] > NEAR_M)
-        column, row = np.clip(cell, 0, size - 1).T
-        keep = inside & (rim[row, column] <= _RIM_PX)
+        drawn = silhouette(vertices, self.faces.astype(np.int32), camera)
+        inside = (pixels > 1).all(axis=1) & (pixels < [camera.width - 1, camera.height - 1]).all(1)
+        keep = inside & (middles[:, 2] > NEAR_M) & (_coverage(drawn, pixels) < _RIM_COVERAGE)
         return BodyOutline(edges[keep], pixels[keep], _unit(outward[keep]), middles[keep, 2])
 
 
-def _distance_inside(mask: Mask) -> NDArray[np.float32]:
-    return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+def _blurred(mask: Mask, sigma_px: float) -> NDArray[np.float32]:
+    return cv2.GaussianBlur(
+        mask.astype(np.float32), (0, 0), sigma_px, borderType=cv2.BORDER_REPLICATE
+    )
+
+
+def _coverage(mask: Mask, pixels: Array) -> Array:
+    """How much (N,) of a blurred mask covers points (N, 2) between pixel centres."""
+    rows_columns = (pixels[:, ::-1] - 0.5).T
+    return map_coordinates(_blurred(mask, _EDGE_BLUR_PX), rows_columns, order=1, mode="nearest")
 
 
 def _unit(vectors: Array) -> Array:
