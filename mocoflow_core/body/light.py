@@ -29,7 +29,7 @@ class LightConfig(ConfigurationPart):
         0.4, ge=0, lt=1, description="cosine to the camera; pixels at flatter sights are left out"
     )
     ridge: float = Field(
-        0.002, ge=0, description="pull to no direction, in variances of the normals; for still bodies"
+        0.002, ge=0, description="pull to no direction, in variances of the normals: still bodies"
     )
     largest: float = Field(0.9, gt=0, lt=1, description="longest light vector; 1 is full darkness")
 
@@ -49,9 +49,9 @@ def measure_light(clip: Clip, meshes: MeshSequence, configuration: LightConfig) 
     posed = meshes.at(clip.frame_indices[rows]).vertices.astype(np.float64)
     tracks = [
         _seen_patches(clip, row, vertices, meshes.faces, configuration.least_facing)
-        for row, vertices in zip(rows, posed, strict=True)
+        for row, vertices in zip(rows.tolist(), posed, strict=True)
     ]
-    if not tracks:
+    if not any(len(seen) for seen, _, _ in tracks):
         return np.zeros(3)
     vertex = np.concatenate([track[0] for track in tracks])
     normal = np.concatenate([track[1] for track in tracks])
@@ -74,9 +74,11 @@ def _seen_patches(
     light = _linear(clip.frames[row][seen]) @ _LUMINANCE
     found, place = np.unique(vertex, return_inverse=True)
     count = np.bincount(place)
-    mean_normal = np.stack([np.bincount(place, normals[seen][:, k]) for k in range(3)], -1)
-    mean_normal /= np.maximum(np.linalg.norm(mean_normal, axis=-1, keepdims=True), 1e-12)
-    return found.astype(np.int64), mean_normal, np.maximum(np.bincount(place, light) / count, _DARKEST)
+    total = np.zeros((len(found), 3))
+    np.add.at(total, place, normals[seen])
+    mean_normal = total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-12)
+    brightness = np.bincount(place, light) / count
+    return found.astype(np.int64), mean_normal, np.maximum(brightness, _DARKEST)
 
 
 def _fit(
@@ -96,8 +98,9 @@ def _fit(
             weight = 1.0 / np.maximum(np.abs(residual_now) / scale, 1.0)
         slope = _without_means(slope, vertex, weight)
         normal_equations = slope.T @ (weight[:, None] * slope)
-        normal_equations += configuration.ridge * weight.sum() / 3.0 * np.eye(3)
-        pulled = slope.T @ (weight * residual_now) - configuration.ridge * weight.sum() / 3.0 * light
+        pull = configuration.ridge * weight.sum() / 3.0
+        normal_equations += pull * np.eye(3)
+        pulled = slope.T @ (weight * residual_now) - pull * light
         light = light + np.linalg.solve(normal_equations, pulled)
         light *= min(1.0, configuration.largest / max(float(np.linalg.norm(light)), 1e-12))
     return light

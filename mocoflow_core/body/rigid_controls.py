@@ -100,7 +100,7 @@ class RigidControls:
 
     @classmethod
     def load(cls, folder: Path) -> RigidControls:
-        return cls(**load_file(folder / _FILE))  # type: ignore[arg-type]
+        return cls(**load_file(folder / _FILE))
 
 
 def rigid_controls(
@@ -124,7 +124,7 @@ def rigid_controls(
     Source: method notes, fast representation (body prior); the paper's sec. 5 names the idea.
     """
     chosen = _thin(canonical_vertices, spacing)
-    largest = np.linalg.norm(np.ptp(canonical_vertices, axis=0))
+    largest = float(np.linalg.norm(np.ptp(canonical_vertices, axis=0)))
     neighbourhood = _neighbourhoods(canonical_vertices, vertices, chosen, neighbours, largest)
     local = canonical_vertices[neighbourhood]  # (K, N, 3)
     centre = local.mean(1)
@@ -136,7 +136,9 @@ def rigid_controls(
         )
         moved = frame[neighbourhood]
         moved_centre = moved.mean(1)
-        rotations[row] = best_rotation(local - centre[:, None], moved - moved_centre[:, None], whole)
+        rotations[row] = best_rotation(
+            local - centre[:, None], moved - moved_centre[:, None], whole
+        )
         observed[row] = moved_centre
     surface = np.concatenate([canonical_vertices, canonical_vertices[faces].mean(1)])
     _, surface_control = cKDTree(centre).query(surface)

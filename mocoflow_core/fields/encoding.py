@@ -29,15 +29,15 @@ class FrequencyEncoding(nn.Module):
     """
 
     weights: Tensor
+    frequencies: Tensor
 
     def __init__(self, dimensions: int, bands: int) -> None:
         super().__init__()
         self.bands = bands
         self.width = dimensions * (1 + 2 * bands)
         self.register_buffer("weights", torch.zeros(bands))
-        self.register_buffer(
-            "frequencies", math.pi * 2.0 ** torch.arange(bands, dtype=torch.float32), persistent=False
-        )
+        frequencies = math.pi * 2.0 ** torch.arange(bands, dtype=torch.float32)
+        self.register_buffer("frequencies", frequencies, persistent=False)
 
     def anneal(self, band_alpha: float) -> None:
         """Set how many bands are on; kept in the state, so that a checkpoint carries it."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import torch
 from pydantic import Field
 from torch import Tensor, nn
@@ -23,6 +25,8 @@ class ResidualConfig(ConfigurationPart):
 class ResidualMotion(nn.Module):
     """Moves canonical points by ``exp(twist(x, code))`` about the middle of the body."""
 
+    centre: Tensor
+
     def __init__(self, centre: Tensor, radius: float, configuration: ResidualConfig) -> None:
         """Args: centre (3,) and radius of the canonical body's box, metres."""
         super().__init__()
@@ -32,12 +36,13 @@ class ResidualMotion(nn.Module):
         widths = [self.encoding.width + configuration.code_width]
         widths += [configuration.hidden] * configuration.layers
         hidden: list[nn.Module] = []
-        for fan_in, fan_out in zip(widths[:-1], widths[1:], strict=True):
+        for fan_in, fan_out in pairwise(widths):
             hidden += [nn.Linear(fan_in, fan_out), nn.ReLU()]
-        self.network = nn.Sequential(*hidden, nn.Linear(widths[-1], 6))
+        head = nn.Linear(widths[-1], 6)
+        self.network = nn.Sequential(*hidden, head)
         # The start is the identity: the mesh's own motion.
-        nn.init.zeros_(self.network[-1].weight)
-        nn.init.zeros_(self.network[-1].bias)
+        nn.init.zeros_(head.weight)
+        nn.init.zeros_(head.bias)
 
     def forward(self, points: Tensor, code: Tensor) -> Tensor:
         """Canonical points (P, 3) with the codes of their moments (P, C) -> moved points."""

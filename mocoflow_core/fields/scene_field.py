@@ -28,8 +28,13 @@ class SceneField(nn.Module):
         return interpolate_rows(self.appearance, self.motion.times, times)
 
     def at_samples(
-        self, body_canonical: Tensor, facing: Tensor, row: Tensor, moments: Moments, appearance: Tensor
+        self,
+        body_canonical: Tensor,
+        facing: Tensor,
+        row: Tensor,
+        moments: Moments,
+        appearance: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Colour (P, 3), density (P,) and surface offset (P,) of samples that the body has mapped."""
+        """Colour (P, 3), density (P,) and surface offset (P,) of samples mapped by the body."""
         canonical = self.motion.correct(body_canonical, row, moments)
         return self.canonical(canonical, appearance[row], facing)

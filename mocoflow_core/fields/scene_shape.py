@@ -44,7 +44,8 @@ class SceneShape(ConfigurationPart):
         motion = HybridMotion(
             torch.tensor(self.times, dtype=torch.float64), centre, radius, self.motion.residual
         )
-        return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, FixedLight(self.light)))
+        light = FixedLight(self.light)
+        return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, light))
 
 
 def _middle(prior: SignedDistancePrior) -> tuple[Tensor, float]:

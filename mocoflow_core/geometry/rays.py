@@ -47,9 +47,7 @@ def pixel_rays(camera: Camera, pixels: Tensor) -> tuple[Rays, Tensor]:
     directions = homogeneous @ inverse.T
     along = directions.norm(dim=-1)
     centre = torch.from_numpy(camera.centre_world).to(directions)
-    rays = Rays(
-        centre.expand_as(directions).float(), (directions / along[:, None]).float()
-    )
+    rays = Rays(centre.expand_as(directions).float(), (directions / along[:, None]).float())
     return rays, along.float()
 
 
@@ -71,6 +69,6 @@ def intersect_boxes(rays: Rays, lower: Tensor, upper: Tensor) -> tuple[Tensor, T
     second = (upper - rays.origins) / safe
     inside = (rays.origins >= lower) & (rays.origins <= upper)
     infinity = torch.full_like(direction, torch.inf)
-    entry = torch.where(parallel, torch.where(inside, -infinity, infinity), torch.minimum(first, second))
-    leave = torch.where(parallel, torch.where(inside, infinity, -infinity), torch.maximum(first, second))
-    return entry.amax(-1).clamp_min(0.0), leave.amin(-1)
+    near = torch.where(parallel, torch.where(inside, -infinity, infinity), first.minimum(second))
+    far = torch.where(parallel, torch.where(inside, infinity, -infinity), first.maximum(second))
+    return near.amax(-1).clamp_min(0.0), far.amin(-1)
