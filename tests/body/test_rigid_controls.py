@@ -145,6 +145,24 @@ def test_a_spinning_body_does_not_shrink_between_frames(degrees):
         assert np.linalg.det(moment.rotations[0]) == pytest.approx(1.0, abs=1e-5)
 
 
+def test_a_limb_that_turns_against_the_body_is_half_turned_half_way():
+    body, limb = figure(), trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    limb.apply_translation([0.5, 0, 0])
+    whole = trimesh.util.concatenate([body, limb])
+    turned = whole.vertices.copy()
+    own = slice(len(body.vertices), None)
+    turn = Rotation.from_euler("y", 100, degrees=True)
+    middle = np.array([0.5, 0, 0])
+    turned[own] = turn.apply(turned[own] - middle) + middle
+    found = measured(whole, [whole.vertices, turned])
+    half = Rotation.from_matrix(found.at_time(0.5).rotations[0])
+    in_limb = found.canonical[:, 0] > 0.4
+    degrees = np.degrees(half.magnitude())
+    # The best rotation of the whole body takes part of the limb's turn.
+    assert degrees[in_limb] == pytest.approx(50, abs=3)
+    assert degrees[~in_limb].max() < 3
+
+
 def test_moments_change_continuously_through_a_frame(rigid):
     middle = float(rigid.times[1])
     at, step = rigid.at_time(middle), 1e-6

@@ -1,3 +1,19 @@
 from __future__ import annotations
 
+import pytest
+
 from tests.one_thread import one_thread  # noqa: F401
+from tests.toy_training import prepare, train, write_toy
+
+
+@pytest.fixture(scope="session")
+def prepared(tmp_path_factory):
+    return prepare(write_toy(tmp_path_factory.mktemp("scene") / "toy"))
+
+
+@pytest.fixture(scope="session")
+def trained(prepared, tmp_path_factory):
+    """The folder of an undisturbed run."""
+    folder = tmp_path_factory.mktemp("trained")
+    train(prepared, folder)
+    return folder
