@@ -81,7 +81,7 @@ def articulate(
 
 
 def _surface_graph(rest: Array, faces: NDArray[np.int32]) -> csr_array:
-    """Edge lengths (V, V), symmetric; loose pieces are tied to the nearest vertex of the largest."""
+    """Symmetric edge lengths (V, V); loose pieces are tied to the nearest vertex of the largest."""
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     count = len(rest)

@@ -100,9 +100,9 @@ class EdgeTopology:
 
 
 def _blurred(mask: Mask, sigma_px: float) -> NDArray[np.float32]:
-    return cv2.GaussianBlur(
-        mask.astype(np.float32), (0, 0), sigma_px, borderType=cv2.BORDER_REPLICATE
-    )
+    solid = mask.astype(np.float32)
+    blurred = cv2.GaussianBlur(solid, (0, 0), sigma_px, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(blurred, np.float32)
 
 
 def _coverage(mask: Mask, pixels: Array) -> Array:
