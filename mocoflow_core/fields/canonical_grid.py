@@ -51,17 +51,16 @@ class CanonicalGrid(nn.Module):
         self.tables = nn.ParameterList(
             nn.Parameter(1e-2 * torch.randn(int(grid.node_map.max()) + 1, width)) for grid in grids
         )
-        features, hidden = width * len(grids), configuration.hidden
-        self.geometry = nn.Sequential(
-            nn.Linear(features, hidden), nn.ReLU(), nn.Linear(hidden, 1 + hidden // 2)
-        )
+        hidden = configuration.hidden
+        entry, head = nn.Linear(width * len(grids), hidden), nn.Linear(hidden, 1 + hidden // 2)
+        self.geometry = nn.Sequential(entry, nn.ReLU(), head)
         self.colour = nn.Sequential(
             nn.Linear(hidden // 2 + configuration.appearance_width, hidden),
             nn.ReLU(),
             nn.Linear(hidden, 3),
         )
-        nn.init.zeros_(self.geometry[-1].weight[:1])
-        nn.init.zeros_(self.geometry[-1].bias[:1])
+        nn.init.zeros_(head.weight[:1])
+        nn.init.zeros_(head.bias[:1])
         self.log_sharpness = nn.Parameter(torch.tensor(math.log(configuration.sharpness_m)))
 
     def features(self, points: Tensor) -> Tensor:

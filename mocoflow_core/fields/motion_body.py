@@ -141,8 +141,9 @@ class BodyMotion:
             "observed_facing": self.observed_facing,
             "canonical_maps": self.canonical_maps,
         }
-        for prefix, grids in (("observed", self.observed_grids), ("canonical", self.canonical_grid)):
-            named |= {f"{prefix}_grid.{name}": part for name, part in grids.tensors().items()}
+        grids = {"observed": self.observed_grids, "canonical": self.canonical_grid}
+        for prefix, grid in grids.items():
+            named |= {f"{prefix}_grid.{name}": part for name, part in grid.tensors().items()}
         return {name: part.contiguous() for name, part in named.items()}
 
     @classmethod

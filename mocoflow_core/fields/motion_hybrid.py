@@ -28,6 +28,8 @@ class HybridMotion(nn.Module):
     The residual of either direction acts in canonical space, where its input is bounded.
     """
 
+    times: Tensor
+
     def __init__(
         self, times: Tensor, centre: Tensor, radius: float, configuration: ResidualConfig
     ) -> None:

@@ -8,10 +8,10 @@ of points from many frames is one look-up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor
+from torch.autograd.function import BackwardCFunction, FunctionCtx
 
 # Offsets of the eight corners of a lattice cell, in the order that the weights use.
 _CORNERS = torch.tensor(
@@ -37,8 +37,13 @@ class SparseGrids:
         return self.origin.shape[0]
 
     def to(self, device: torch.device) -> SparseGrids:
-        parts = (self.origin, self.shape, self.offset, self.node_map)
-        return SparseGrids(*(part.to(device) for part in parts), self.spacing)
+        return SparseGrids(
+            self.origin.to(device),
+            self.shape.to(device),
+            self.offset.to(device),
+            self.node_map.to(device),
+            self.spacing,
+        )
 
     def tensors(self) -> dict[str, Tensor]:
         """All content as named tensors, for saving."""
@@ -120,26 +125,31 @@ class WeightedRows(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx: Any, table: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
+    def forward(ctx: FunctionCtx, table: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
         ctx.save_for_backward(table, numbers, weights)
         return torch.nn.functional.embedding_bag(
             numbers, table, per_sample_weights=weights, mode="sum"
         )
 
     @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, None, Tensor | None]:  # type: ignore[override]
-        table, numbers, weights = ctx.saved_tensors
+    def backward(
+        ctx: BackwardCFunction, gradient: Tensor
+    ) -> tuple[Tensor | None, None, Tensor | None]:
+        # Torch's own types say that there is one of each.
+        saved: tuple[Tensor, ...] = ctx.saved_tensors
+        needed: tuple[bool, ...] = ctx.needs_input_grad
+        table, numbers, weights = saved
         for_table = for_weights = None
-        if ctx.needs_input_grad[0]:
+        if needed[0]:
             spread = weights[..., None] * gradient[:, None]
             for_table = torch.zeros_like(table).index_add_(
                 0, numbers.flatten(), spread.flatten(0, 1)
             )
-        if ctx.needs_input_grad[2]:
+        if needed[2]:
             for_weights = (table[numbers] @ gradient[..., None])[..., 0]
         return for_table, None, for_weights
 
 
 def weighted_rows(table: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
     """Differentiable weighted sums of table rows, (P, C); see ``WeightedRows``."""
-    return WeightedRows.apply(table, numbers, weights)  # type: ignore[no-any-return]
+    return WeightedRows.apply(table, numbers, weights)
