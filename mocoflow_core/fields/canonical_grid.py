@@ -28,7 +28,10 @@ class CanonicalConfig(ConfigurationPart):
     hidden: int = Field(32, ge=1, description="width of the two networks")
     appearance_width: int = Field(8, ge=1, description="length of the per-image code (paper: 8)")
     sharpness_m: float = Field(0.006, gt=0, description="width of the density's edge at the start")
-    largest_offset_m: float = Field(0.06, gt=0, description="how far the surface may move")
+    largest_offset_m: float = Field(0.06, gt=0, description="how far the surface may move out")
+    deepest_offset_m: float = Field(
+        0.03, gt=0, description="and in: less than sampling.inner_depth_m, lest the body leaks"
+    )
     margin_m: float = Field(0.02, ge=0, description="features beyond the shell, for moved samples")
 
 
@@ -74,8 +77,8 @@ class CanonicalGrid(nn.Module):
 
     def offset_m(self, head: Tensor) -> Tensor:
         """How far the learned surface lies outside the prior's, bounded, metres."""
-        limit = self.configuration.largest_offset_m
-        return limit * torch.tanh(head / limit)
+        out, deep = self.configuration.largest_offset_m, self.configuration.deepest_offset_m
+        return torch.where(head > 0, out * torch.tanh(head / out), deep * torch.tanh(head / deep))
 
     def forward(
         self, points: Tensor, appearance: Tensor, facing: Tensor

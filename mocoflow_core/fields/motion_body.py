@@ -7,19 +7,18 @@ is one trilinear look-up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial import cKDTree
 from torch import Tensor
+from torch.nn.functional import embedding_bag, normalize
 
 from mocoflow_core.body.rigid_controls import RigidControls
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
-from mocoflow_core.geometry.grid import SparseGrids
+from mocoflow_core.geometry.grid import Corners, SparseGrids
 
 Array = NDArray[np.float32]
 
@@ -35,15 +34,6 @@ class BodyMotionConfig(ConfigurationPart):
     stay_within_m: float = Field(
         0.15, gt=0, description="controls that ever part farther are not blended (limbs in contact)"
     )
-
-
-@dataclass(frozen=True, eq=False)
-class BodyLookup:
-    """What the body knows about P observed points."""
-
-    canonical: Tensor  # (P, 3)
-    distance: Tensor  # (P,) from the frame's mesh, metres, unsigned
-    facing: Tensor  # (P, 3) unit normal of the surface near the point, world space
 
 
 class BodyMotion:
@@ -65,7 +55,7 @@ class BodyMotion:
         self.times = times  # (T,) float64
         self.observed_grids = observed_grids  # one grid per frame
         self.observed_maps = observed_maps  # (N, 4, 3) to canonical
-        self.observed_distance = observed_distance  # (N,) metres from the frame's mesh
+        self.observed_distance = observed_distance  # (N,) metres from the mesh, negative inside
         self.observed_facing = observed_facing  # (N, 3) unit normals of the nearest surface
         self.canonical_grid = canonical_grid  # one grid
         self.canonical_maps = canonical_maps  # (T, M, 4, 3) to observed
@@ -106,19 +96,33 @@ class BodyMotion:
         place = np.stack(np.unravel_index(np.flatnonzero(near.cpu().numpy()), shape), -1)
         return grids.origin[row].double().cpu().numpy() + grids.spacing * place, grids.spacing
 
-    def to_canonical(self, points: Tensor, frame: Tensor) -> BodyLookup:
-        """Observed points to canonical space; unmoved and infinitely far where no node is near."""
-        numbers, weights = self.observed_grids.corners(points, frame)
-        fixed = weights.detach()
-        known = fixed.sum(-1) > 0
-        distance = (self.observed_distance[numbers] * fixed).sum(-1)
-        facing = (self.observed_facing[numbers] * fixed[..., None]).sum(1)
-        mapped = _blend(self.observed_maps[numbers], weights, points, self._apart)
-        return BodyLookup(
-            torch.where(known[:, None], mapped, points),
-            torch.where(known, distance, torch.inf),
-            torch.nn.functional.normalize(facing, dim=-1),
+    def distance(self, corners: Corners) -> Tensor:
+        """Signed distance (P,) from the frame's mesh; infinite where no node is near."""
+        numbers, weights = corners
+        weights = weights.detach()
+        found = (self.observed_distance[numbers] * weights).sum(-1)
+        return torch.where(weights.sum(-1) > 0, found, torch.inf)
+
+    def facing(self, corners: Corners) -> Tensor:
+        """Unit normals (P, 3) of the surface near observed points."""
+        numbers, weights = corners
+        blended = embedding_bag(
+            numbers, self.observed_facing, per_sample_weights=weights.detach(), mode="sum"
         )
+        return normalize(blended, dim=-1)
+
+    def to_canonical(
+        self, points: Tensor, frame: Tensor, corners: Corners | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Observed points (P, 3) to canonical space; and whether a node is near.
+
+        A point that no node is near stays where it is. ``corners`` saves the look-up where the
+        caller has made it already.
+        """
+        numbers, weights = corners or self.observed_grids.corners(points, frame)
+        known = weights.detach().sum(-1) > 0
+        mapped = _blend(self.observed_maps[numbers], weights, points, self._apart)
+        return torch.where(known[:, None], mapped, points), known
 
     def to_observed(self, points: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
         """Canonical points to the observed space of their frames; and whether a node is near."""
@@ -171,7 +175,9 @@ def _blend(maps: Tensor, weights: Tensor, points: Tensor, apart: float) -> Tenso
     Corners that carry the point farther than ``apart`` from where the heaviest corner carries it
     belong to another limb; a point between two limbs goes with the nearer one, never half-way.
     """
-    mapped = (maps[:, :, :3] * points[:, None, :, None]).sum(2) + maps[:, :, 3]
+    x, y, z = points[:, None, :, None].unbind(2)
+    mapped = torch.addcmul(maps[:, :, 3], maps[:, :, 0], x)
+    mapped = torch.addcmul(torch.addcmul(mapped, maps[:, :, 1], y), maps[:, :, 2], z)
     heaviest = weights.detach().argmax(-1)
     reference = mapped.detach()[torch.arange(len(points), device=points.device), heaviest]
     agrees = ((mapped.detach() - reference[:, None]) ** 2).sum(-1) < apart**2
@@ -205,7 +211,9 @@ def build_body_motion(
         lattices.append(lattice)
         distances.append(distance)
         maps.append(_node_maps(nodes, source, target, inverse, ever_apart, configuration))
-        facing.append(_facing(nodes, maps[-1], prior))
+        inside, normals = _side_and_normals(nodes, maps[-1], prior)
+        distances[-1][inside] *= -1.0
+        facing.append(normals)
     canonical_nodes, canonical_lattice, _ = _nodes_near(controls.surface, spacing, node_reach)
     canonical_maps = [
         _node_maps(
@@ -267,11 +275,14 @@ def _node_maps(
     return np.concatenate([np.swapaxes(blended, -1, -2), shift[:, None]], 1).astype(np.float32)
 
 
-def _facing(nodes: Array, maps: Array, prior: SignedDistancePrior) -> Tensor:
-    """Canonical normals at the mapped nodes, turned back into observed space, (N, 3)."""
+def _side_and_normals(
+    nodes: Array, maps: Array, prior: SignedDistancePrior
+) -> tuple[NDArray[np.bool_], Tensor]:
+    """Which nodes lie inside the body (N,), and its normals turned to observed space (N, 3)."""
     turn = torch.from_numpy(maps[:, :3])
     mapped = (torch.from_numpy(nodes)[:, None] @ turn)[:, 0] + torch.from_numpy(maps[:, 3])
-    return (turn @ prior.normals(mapped)[..., None])[..., 0]
+    normals = (turn @ prior.normals(mapped)[..., None])[..., 0]
+    return (prior(mapped) < 0).numpy(), normals
 
 
 def _nearest_rotation(matrices: Array) -> Array:

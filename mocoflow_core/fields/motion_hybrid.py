@@ -54,7 +54,7 @@ class HybridMotion(nn.Module):
 
     def to_canonical(self, points: Tensor, row: Tensor, moments: Moments) -> Tensor:
         """Observed points (P, 3) of moments (P,) to canonical space."""
-        return self.correct(moments.body.to_canonical(points, row).canonical, row, moments)
+        return self.correct(moments.body.to_canonical(points, row)[0], row, moments)
 
     def to_observed(self, points: Tensor, row: Tensor, moments: Moments) -> tuple[Tensor, Tensor]:
         """Canonical points (P, 3) to the space of their moments; and where the body is near."""

@@ -19,6 +19,9 @@ _CORNERS = torch.tensor(
 )
 
 
+Corners = tuple[Tensor, Tensor]  # numbers (P, 8) of nodes and their weights (P, 8)
+
+
 @dataclass(frozen=True, eq=False)
 class SparseGrids:
     """G sparse lattices with one spacing.
@@ -88,7 +91,7 @@ class SparseGrids:
         nearest = torch.round(self._lattice(points, grid)).long()
         return self._flat(nearest.clamp_min(0), grid)
 
-    def corners(self, points: Tensor, grid: Tensor) -> tuple[Tensor, Tensor]:
+    def corners(self, points: Tensor, grid: Tensor) -> Corners:
         """Numbers (P, 8) and trilinear weights (P, 8) of the nodes around each point.
 
         Missing nodes get weight zero and the rest is scaled up to sum to one; a point with no

@@ -47,7 +47,7 @@ class BodyOnlyMotion:
     def to_canonical(self, points: Points, frame_index: int) -> Points:
         moments = _moments(self.renderer, frame_index)
         row = torch.zeros(len(points), dtype=torch.int64)
-        return _array(moments.body.to_canonical(_tensor(points), row).canonical)
+        return _array(moments.body.to_canonical(_tensor(points), row)[0])
 
     def to_observed(self, points: Points, frame_index: int) -> Points:
         moments = _moments(self.renderer, frame_index)

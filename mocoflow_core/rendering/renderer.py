@@ -50,8 +50,8 @@ def sample_shell(
     """Samples of rays (R,) of moments row (R,) that lie in the shell around the body.
 
     Between near and far (R,), lattice nodes and the distance from the moment's mesh leave out
-    empty space. The inside of the body is opaque: whatever lies deeper under the canonical skin
-    than ``inner_depth_m``, or behind such a point, cannot be seen.
+    empty space. The inside of the body is opaque: what lies deeper under the skin than
+    ``inner_depth_m``, or behind such a point, cannot be seen.
     """
     body = moments.body
     samples = march(
@@ -62,15 +62,14 @@ def sample_shell(
         jitter,
         lambda points, ray: body.near_body(points, row[ray], shell_width_m),
     )
+    corners = body.observed_grids.corners(samples.points, row[samples.ray])
+    distance = body.distance(corners)
+    hidden = running_count(distance < -configuration.inner_depth_m, samples.ray, len(rays)) > 0
+    keep = ((distance < shell_width_m) & ~hidden).nonzero()[:, 0]
+    samples, corners = samples.select(keep), (corners[0][keep], corners[1][keep])
     sample_row = row[samples.ray]
-    found = body.to_canonical(samples.points, sample_row)
-    known = found.distance < shell_width_m
-    inside = field.canonical.prior(found.canonical) < -configuration.inner_depth_m
-    hidden = running_count(inside & torch.isfinite(found.distance), samples.ray, len(rays)) > 0
-    keep = (known & ~hidden).nonzero()[:, 0]
-    return ShellSamples(
-        samples.select(keep), found.canonical[keep], found.facing[keep], sample_row[keep]
-    )
+    canonical, _ = body.to_canonical(samples.points, sample_row, corners)
+    return ShellSamples(samples, canonical, body.facing(corners), sample_row)
 
 
 def render_rays(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+import json
 from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from safetensors.torch import load_file
+from torch import Tensor
 
 from mocoflow_core.body.rigid_controls import RigidControls
 from mocoflow_core.fields.canonical_density import CanonicalDensity
@@ -18,9 +19,10 @@ from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.scene_shape import SceneShape
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.rays import pixel_rays
-from mocoflow_core.rendering.pixels import shell_pixels
+from mocoflow_core.rendering.pixels import ShellPixels, shell_pixels
 from mocoflow_core.rendering.renderer import render_rays
 from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.threads import torch_threads
 
 _RAYS_AT_ONCE = 16_384
 
@@ -31,12 +33,18 @@ class TrainedScene:
     """Renders deterministically: no jitter, no random state."""
 
     def __init__(
-        self, field: SceneField, controls: RigidControls, shape: SceneShape, sampling: SamplingConfig
+        self,
+        field: SceneField,
+        controls: RigidControls,
+        shape: SceneShape,
+        sampling: SamplingConfig,
+        threads: int = 1,
     ) -> None:
         self.field = field.eval().requires_grad_(False)
         self.controls = controls
         self.shape = shape
         self.sampling = sampling
+        self.threads = threads  # as many as the optimisation found worth it
         self._bodies: dict[float, BodyMotion] = {}
 
     def share_bodies(self, other: TrainedScene) -> None:
@@ -78,6 +86,21 @@ class TrainedScene:
         rgb = torch.from_numpy(behind.reshape(-1, 3).copy())
         opacity = torch.zeros(len(rgb))
         shell = shell_pixels(camera, moments.body, 0, self.shape.shell_width_m)
+        with torch_threads(self.threads):
+            self._fill(rgb, opacity, camera, shell, moments, appearance)
+        size = (camera.height, camera.width)
+        return rgb.numpy().reshape(*size, 3), opacity.numpy().reshape(size)
+
+    def _fill(
+        self,
+        rgb: Tensor,
+        opacity: Tensor,
+        camera: Camera,
+        shell: ShellPixels,
+        moments: Moments,
+        appearance: Tensor,
+    ) -> None:
+        """Render the shell's pixels into ``rgb`` (H W, 3), which holds what is behind them."""
         for rows in torch.arange(len(shell.pixels)).split(_RAYS_AT_ONCE):
             chunk = shell.pixels[rows]
             rays, along = pixel_rays(camera, chunk)
@@ -96,8 +119,6 @@ class TrainedScene:
             )
             rgb[chunk] = rendered.rgb
             opacity[chunk] = rendered.opacity
-        size = (camera.height, camera.width)
-        return rgb.numpy().reshape(*size, 3), opacity.numpy().reshape(size)
 
     @classmethod
     def open(cls, folder: Path, weights: Path | None = None) -> TrainedScene:
@@ -111,4 +132,6 @@ class TrainedScene:
         field = shape.build(density.prior())
         field.load_state_dict(load_file(weights or folder / "model.safetensors"))
         sampling = SamplingConfig(step_m=shape.step_m, inner_depth_m=shape.inner_depth_m)
-        return cls(field, RigidControls.load(folder), shape, sampling)
+        result = folder / "result.json"
+        threads = json.loads(result.read_text())["threads"] if result.is_file() else 1
+        return cls(field, RigidControls.load(folder), shape, sampling, threads)

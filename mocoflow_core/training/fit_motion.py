@@ -93,7 +93,7 @@ def measure_fit(
     for row, vertices in enumerate(observed):
         points = torch.from_numpy(vertices)
         frame = torch.full((len(points),), row)
-        mapped = body.to_canonical(points, frame).canonical
+        mapped, _ = body.to_canonical(points, frame)
         placed, _ = body.to_observed(goal, frame)
         back, _ = body.to_observed(mapped, frame)
         errors.append([_mean_mm(mapped, goal), _mean_mm(placed, points), _mean_mm(back, points)])

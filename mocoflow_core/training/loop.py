@@ -11,6 +11,7 @@ import torch
 from safetensors.torch import save_file
 
 from mocoflow_core.fields.scene_field import SceneField
+from mocoflow_core.threads import choose_threads, torch_threads
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.checkpoint import (
     Progress,
@@ -22,7 +23,6 @@ from mocoflow_core.training.clock import Seconds, TrainingClock, snapshot_due
 from mocoflow_core.training.guard import Guard
 from mocoflow_core.training.objective import Objective
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
-from mocoflow_core.training.threads import choose_threads
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
@@ -56,7 +56,8 @@ class TrainingRun:
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
         if restored is None:
-            self.progress = Progress(choose_threads(schedule.threads), schedule.joint_steps)
+            threads = choose_threads(schedule.threads, self._try_out)
+            self.progress = Progress(threads, schedule.joint_steps)
         else:
             self.progress = restored
             self.progress.tries += 1
@@ -65,13 +66,9 @@ class TrainingRun:
         self.guard.rate_scale = self.progress.rate_scale
 
     def run(self) -> None:
-        """All remaining steps. Restores torch's thread count at the end."""
-        threads = torch.get_num_threads()
-        torch.set_num_threads(self.progress.threads)
-        try:
+        """All remaining steps."""
+        with torch_threads(self.progress.threads):
             self._steps()
-        finally:
-            torch.set_num_threads(threads)
 
     @property
     def recent_losses(self) -> dict[str, float]:
@@ -101,6 +98,13 @@ class TrainingRun:
                 done = self.progress.step / self.progress.steps
                 self.report(done, f"step {self.progress.step} of {self.progress.steps}")
         self._snapshot()
+
+    def _try_out(self) -> None:
+        """The work of a step without its effect: for choosing the number of threads."""
+        generator = torch.Generator().manual_seed(0)
+        batch = self.pixels.batch(self.schedule.rays, self.schedule.frames_per_step, generator)
+        torch.stack(list(self.objective(batch, generator).values())).sum().backward()
+        self.optimiser.zero_grad(set_to_none=True)
 
     def _step(self, step: int) -> None:
         schedule, steps = self.schedule, self.progress.steps

@@ -94,8 +94,8 @@ class Objective:
         motion, moments = self.field.motion, self.moments
 
         def to_canonical(points: Tensor, row: Tensor) -> tuple[Tensor, Tensor]:
-            found = moments.body.to_canonical(points, row)
-            return motion.correct(found.canonical, row, moments), torch.isfinite(found.distance)
+            by_body, known = moments.body.to_canonical(points, row)
+            return motion.correct(by_body, row, moments), known
 
         def to_observed(points: Tensor, row: Tensor) -> tuple[Tensor, Tensor]:
             return motion.to_observed(points, row, moments)

@@ -29,9 +29,10 @@ def test_a_rigidly_moving_body_maps_exactly_both_ways(rigid, row):
     canonical = near_surface(rigid.mesh, 0.9 * REACH_M)
     observed = rotation.apply(canonical) + shift
     frame = rows(len(canonical), row)
-    mapped = rigid.body.to_canonical(single(observed), frame)
+    mapped, near = rigid.body.to_canonical(single(observed), frame)
+    assert near.all()
     # Maps in single precision, about points up to 3 m from the origin.
-    assert mapped.canonical.numpy() == pytest.approx(canonical, abs=1e-5)
+    assert mapped.numpy() == pytest.approx(canonical, abs=1e-5)
     placed, known = rigid.body.to_observed(single(canonical), frame)
     assert known.all()
     assert placed.numpy() == pytest.approx(observed, abs=1e-5)
@@ -40,33 +41,35 @@ def test_a_rigidly_moving_body_maps_exactly_both_ways(rigid, row):
 @pytest.mark.parametrize("row", range(len(MOTIONS)))
 def test_surfaces_face_where_the_turned_body_faces(rigid, row):
     rotation, shift = MOTIONS[row]
-    found = rigid.body.to_canonical(
-        single(rotation.apply(rigid.mesh.vertices) + shift), rows(len(rigid.mesh.vertices), row)
-    )
+    points = single(rotation.apply(rigid.mesh.vertices) + shift)
+    facing = rigid.body.facing(rigid.body.observed_grids.corners(points, rows(len(points), row)))
     expected = rotation.apply(rigid.mesh.vertex_normals.copy())
-    agreement = (found.facing.numpy() * expected).sum(-1)
+    agreement = (facing.numpy() * expected).sum(-1)
     assert np.median(agreement) > 0.98
     assert agreement.min() > 0.8
-    assert found.facing.norm(dim=-1).numpy() == pytest.approx(1.0, abs=1e-5)
+    assert facing.norm(dim=-1).numpy() == pytest.approx(1.0, abs=1e-5)
 
 
 def test_distances_are_those_from_the_mesh_of_the_frame(rigid):
     rotation, shift = MOTIONS[1]
     canonical = near_surface(rigid.mesh, 0.9 * REACH_M)
-    found = rigid.body.to_canonical(single(rotation.apply(canonical) + shift), rows(400, 1))
-    expected = np.abs(trimesh.proximity.signed_distance(rigid.mesh, canonical))
-    # Linear between nodes of a function with a kink at the surface.
+    points = single(rotation.apply(canonical) + shift)
+    found = rigid.body.distance(rigid.body.observed_grids.corners(points, rows(400, 1)))
+    expected = -trimesh.proximity.signed_distance(rigid.mesh, canonical)
+    # Linear between nodes of a distance to points, not to triangles.
     spacing = BodyMotionConfig().node_spacing_m
-    assert found.distance.numpy() == pytest.approx(expected, abs=spacing)
-    assert np.median(np.abs(found.distance.numpy() - expected)) < 0.4 * spacing
+    assert found.numpy() == pytest.approx(expected, abs=spacing)
+    assert np.median(np.abs(found.numpy() - expected)) < 0.4 * spacing
 
 
 def test_far_points_stay_where_they_are_and_are_infinitely_far(rigid):
     far = torch.tensor([[9.0, 0.0, 0.0], [-1e4, 1e4, 5.0]])
-    found = rigid.body.to_canonical(far, rows(2, 1))
-    assert torch.equal(found.canonical, far)
-    assert torch.isinf(found.distance).all()
-    assert torch.isfinite(found.facing).all()
+    mapped, near = rigid.body.to_canonical(far, rows(2, 1))
+    assert torch.equal(mapped, far)
+    assert not near.any()
+    corners = rigid.body.observed_grids.corners(far, rows(2, 1))
+    assert torch.isposinf(rigid.body.distance(corners)).all()
+    assert torch.isfinite(rigid.body.facing(corners)).all()
     placed, known = rigid.body.to_observed(far, rows(2, 1))
     assert torch.equal(placed, far)
     assert not known.any()
@@ -130,7 +133,7 @@ def test_limbs_in_contact_in_canonical_space_do_not_mix(parting):
 def test_limbs_that_come_into_contact_do_not_mix(parting):
     _, meeting = parting
     points = in_limbs(limbs(gap=0.01))
-    mapped = meeting.body.to_canonical(single(points), rows(len(points), 0)).canonical
+    mapped = meeting.body.to_canonical(single(points), rows(len(points), 0))[0]
     shift = mapped.numpy() - points
     with_left, with_right = np.abs(shift).max(-1), np.abs(shift - APART).max(-1)
     assert np.minimum(with_left, with_right).max() < 1e-3
@@ -147,7 +150,7 @@ def test_a_bending_body_comes_back_to_where_it_was():
     bent[:, 0] += np.where(height > 0, 0.5 * angle * height, 0)
     bending = figure(rod, [bent])
     frame = rows(len(bent), 0)
-    mapped = bending.body.to_canonical(single(bent), frame).canonical
+    mapped = bending.body.to_canonical(single(bent), frame)[0]
     back, known = bending.body.to_observed(mapped, frame)
     assert known.all()
     error = np.linalg.norm(back.numpy() - bent, axis=-1)
@@ -161,7 +164,7 @@ def test_gradients_reach_the_points_and_stay_finite(rigid):
         np.concatenate([near_surface(rigid.mesh, 2.5 * REACH_M), [[50.0, 0, 0]]])
     ).requires_grad_()
     frame = rows(len(points), 0)
-    found = rigid.body.to_canonical(points, frame).canonical
+    found = rigid.body.to_canonical(points, frame)[0]
     placed, _ = rigid.body.to_observed(points, frame)
     (found.sum() + placed.sum()).backward()
     assert torch.isfinite(points.grad).all()
@@ -176,7 +179,7 @@ def test_many_frames_are_one_look_up(rigid):
     for row in range(len(MOTIONS)):
         alone, _ = rigid.body.to_observed(single(canonical), rows(90, row))
         assert torch.equal(placed[frame == row], alone[frame == row])
-    back = rigid.body.to_canonical(placed, frame).canonical
+    back = rigid.body.to_canonical(placed, frame)[0]
     assert back.numpy() == pytest.approx(canonical, abs=2e-5)
 
 
@@ -195,6 +198,7 @@ def test_saved_tables_are_the_same_motion(rigid):
     loaded = BodyMotion.from_tensors(rigid.body.tensors())
     points, frame = single(near_surface(rigid.mesh, 0.05)), rows(400, 0)
     ours, theirs = (body.to_canonical(points, frame) for body in (rigid.body, loaded))
-    assert torch.equal(ours.canonical, theirs.canonical)
-    assert torch.equal(ours.distance, theirs.distance)
+    assert torch.equal(ours[0], theirs[0])
+    assert torch.equal(ours[1], theirs[1])
+    assert torch.equal(loaded.observed_distance, rigid.body.observed_distance)
     assert torch.equal(loaded.times, rigid.body.times)

@@ -71,8 +71,10 @@ def test_the_shell_lies_between_near_and_far(prepared, pixels):
     steps = torch.linspace(0, 8, 400)
     points = found.rays.origins[:, None] + steps[None, :, None] * found.rays.directions[:, None]
     rows = found.row[:, None].expand(-1, 400).reshape(-1)
-    near_body = prepared.motion.body.near_body(points.reshape(-1, 3), rows, SHELL_M)
-    inside = prepared.motion.body.to_canonical(points.reshape(-1, 3), rows).distance < SHELL_M
+    body = prepared.motion.body
+    near_body = body.near_body(points.reshape(-1, 3), rows, SHELL_M)
+    corners = body.observed_grids.corners(points.reshape(-1, 3), rows)
+    inside = body.distance(corners).abs() < SHELL_M
     shell = (near_body & inside).reshape(-1, 400)
     between = (steps >= found.near[:, None]) & (steps <= found.far[:, None])
     assert shell.any()
