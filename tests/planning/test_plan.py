@@ -30,6 +30,7 @@ DECISIONS = [
     "motion_consensus",
     "fit_motion_steps",
     "appearance_codes",
+    "fixed_light",
 ]
 
 
@@ -107,6 +108,13 @@ def test_every_decision_can_be_forced(folder, force):
     for name in DECISIONS:
         assert plan.needs(name) == (force == "on")
         assert f"forced {force}" in plan.decision(name).reason
+
+
+def test_a_person_as_bright_from_every_side_gets_no_light(folder):
+    plan = planned(folder)
+    decision = plan.decision("fixed_light")
+    assert decision.evidence["strength"] < 0.1 * decision.threshold
+    assert plan.light == (0.0, 0.0, 0.0)
 
 
 def test_forcing_the_residual_off_leaves_nothing_to_regularise(folder):
