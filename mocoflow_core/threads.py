@@ -1,4 +1,4 @@
-"""How many threads torch gets: measured on the work itself, because a busy core makes two slower."""
+"""How many threads torch gets: measured on the work itself, as a busy core makes two slower."""
 
 from __future__ import annotations
 

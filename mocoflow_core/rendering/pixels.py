@@ -49,9 +49,7 @@ def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: floa
     )
 
 
-def _paint(
-    camera: Camera, at: NDArray, radius: NDArray, depth: NDArray
-) -> NDArray[np.float32]:
+def _paint(camera: Camera, at: NDArray, radius: NDArray, depth: NDArray) -> NDArray[np.float32]:
     image = np.zeros((camera.height, camera.width), np.float32)
     limit = 4 * (camera.width + camera.height)
     for (x, y), r, value in zip(at, radius, depth, strict=True):

@@ -151,9 +151,7 @@ class TrainingRun:
         index.write_text(json.dumps(entries))
 
     def _save(self) -> None:
-        save_checkpoint(
-            self.workspace, self.progress, self.field, self.optimiser, self.generator
-        )
+        save_checkpoint(self.workspace, self.progress, self.field, self.optimiser, self.generator)
 
 
 def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:

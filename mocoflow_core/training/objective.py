@@ -53,7 +53,8 @@ class Objective:
             "photometric": photometric(rendered.rgb, batch.rgb),
             "silhouette": weights.silhouette_weight
             * silhouette(rendered.opacity * batch.has_mask, batch.mask * batch.has_mask),
-            "offset": weights.offset_weight * (rendered.offset_m**2).sum()
+            "offset": weights.offset_weight
+            * (rendered.offset_m**2).sum()
             / max(len(rendered.offset_m), 1),
         }
         if self.field.appearance.requires_grad:
@@ -62,7 +63,9 @@ class Objective:
             terms |= self._motion_terms(rendered, generator)
         return terms
 
-    def _motion_terms(self, rendered: RenderedRays, generator: torch.Generator) -> dict[str, Tensor]:
+    def _motion_terms(
+        self, rendered: RenderedRays, generator: torch.Generator
+    ) -> dict[str, Tensor]:
         """Consensus and regularity of the motion at a few samples that have density."""
         weights, shell = self.losses, rendered.shell
         solid = (rendered.density.detach() > weights.density_threshold).nonzero()[:, 0]
