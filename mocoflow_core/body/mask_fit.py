@@ -12,15 +12,25 @@ from pydantic import Field
 from torch import Tensor
 
 from mocoflow_core.body.articulation import Articulation, articulate
+from mocoflow_core.body.joint_correction import JointCorrection, blend, smooth_mixing
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.body.outline import EdgeTopology, MaskOutline, match_outlines
+from mocoflow_core.body.outline import (
+    BodyOutline,
+    EdgeTopology,
+    MaskOutline,
+    Matches,
+    match_outlines,
+)
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.geometry.se3 import exp_se3
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
+
+# Gradients of whitened unknowns are of size one or more where they say anything; smaller ones are
+# not blown up to full steps.
+_ADAM_EPSILON = 1.0
 
 
 class MaskFitConfig(ConfigurationPart):
@@ -32,18 +42,27 @@ class MaskFitConfig(ConfigurationPart):
     stiff_error_deg: float = Field(0.3, gt=0, description="The same where the mesh never bends.")
     root_error_m: float = Field(0.02, gt=0, description="Usual error of the body's place.")
     error_seconds: float = Field(0.5, gt=0, description="How long an error stays alike.")
-    outline_error_m: float = Field(0.01, gt=0, description="Usual distance of right outlines.")
-    outlier_m: float = Field(0.06, gt=0, description="Points farther off than this count less.")
-    clothes_m: float = Field(0.01, gt=0, description="Usual standing off of clothes from the mesh.")
+    outline_error_m: float = Field(0.02, gt=0, description="Usual distance of right outlines.")
+    outlier_m: float = Field(0.08, gt=0, description="Points farther off count less, at first.")
+    last_outlier_m: float = Field(0.02, gt=0, description="The same in the last round.")
+    agreeing_px: float = Field(
+        0.5, ge=0, description="Outlines that agree so well, in three quarters of their points."
+    )
+    apart_px: float = Field(
+        1.5,
+        gt=0,
+        description="Outlines so far apart show errors of the usual size.",
+    )
+    clothes_m: float = Field(0.02, gt=0, description="Usual standing off of clothes from the mesh.")
     independent_points: int = Field(
         60, ge=1, description="Parts of one frame's outline that err on their own."
     )
     outline_points: int = Field(240, ge=8, description="Points taken on each mask's outline.")
-    turn_m: float = Field(0.10, gt=0, description="Distance that a turn of 60 degrees is worth.")
+    turn_m: float = Field(0.05, gt=0, description="Distance that a turn of 60 degrees is worth.")
     least_agreement: float = Field(0.3, ge=-1, le=1, description="Cosine of matching outlines.")
     rounds: int = Field(12, ge=1, description="Searches of matching points.")
     steps: int = Field(12, ge=1, description="Optimiser steps after each search.")
-    rate: float = Field(0.06, gt=0, description="Adam's first rate, in usual errors; falls to 0.")
+    rate: float = Field(0.15, gt=0, description="Adam's first rate, in usual errors; falls to 0.")
 
 
 def fit_to_masks(
@@ -65,125 +84,82 @@ def fit_to_masks(
         return meshes
     frames = clip.frame_indices[training]
     outlines = [MaskOutline.of(mask, configuration.outline_points) for mask in clip.masks[training]]
-    skeleton = articulate(
-        meshes.vertices, meshes.faces, configuration.parts, configuration.blend_m
-    )
-    correction = _Correction(skeleton, meshes, clip, frames, configuration)
+    skeleton = articulate(meshes.vertices, meshes.faces, configuration.parts, configuration.blend_m)
     rows = np.searchsorted(meshes.frame_indices, frames)
     topology = EdgeTopology.of(meshes.faces)
+    expected = _expected_share(
+        [topology.outline(vertices, clip.camera) for vertices in meshes.vertices[rows]],
+        outlines,
+        clip.camera,
+        configuration,
+    )
+    if expected == 0:
+        return meshes
+    correction = _no_correction(skeleton, meshes, clip, frames, expected, configuration)
     _optimise(correction, rows, outlines, topology, clip.camera, configuration, progress)
     with torch.no_grad():
         return replace(meshes, vertices=correction.vertices(np.arange(len(meshes.vertices))))
 
 
-class _Correction:
-    """Whitened unknowns: all of usual size one. Angles and shifts are smooth mixtures of them."""
-
-    def __init__(
-        self,
-        skeleton: Articulation,
-        meshes: MeshSequence,
-        clip: Clip,
-        frames: NDArray[np.int32],
-        configuration: MaskFitConfig,
-    ) -> None:
-        self.skeleton = skeleton
-        self.meshes = meshes
-        mixing = _smooth_mixing(meshes.frame_indices, frames, clip, configuration.error_seconds)
-        self._mixing = torch.from_numpy(mixing).float()
-        least, most = np.radians([configuration.stiff_error_deg, configuration.joint_error_deg])
-        angles = np.clip(skeleton.bend, least, most)
-        angles[0] = most
-        self._angles = torch.from_numpy(angles).float()[:, None]
-        self._root_m = configuration.root_error_m
-        self._clothes_m = configuration.clothes_m
-        self._bases = torch.from_numpy(skeleton.bases).float()
-        self._pivots = torch.from_numpy(skeleton.pivots).float()
-        self._weights = torch.from_numpy(skeleton.weights).float()
-        self._places = torch.from_numpy(meshes.vertices)
-        self._levels = _levels(skeleton.parents)
-        parts = len(skeleton.parents)
-        self.turns = torch.zeros(len(frames), parts, 3, requires_grad=True)
-        self.shifts = torch.zeros(len(frames), 3, requires_grad=True)
-        self.clothes = torch.zeros(parts, requires_grad=True)
-
-    def unknowns(self) -> list[Tensor]:
-        return [self.turns, self.shifts, self.clothes]
-
-    def surprise(self) -> Tensor:
-        """Minus the logarithm of how likely such errors are."""
-        return 0.5 * sum(((part * part).sum() for part in self.unknowns()), torch.zeros(()))
-
-    def transforms(self, rows: NDArray[np.int64]) -> Tensor:
-        """What moves each part (T, P, 3, 4) at the given frames of the mesh sequence."""
-        mixing = self._mixing[rows]
-        local = torch.einsum("ts,spc->tpc", mixing, self.turns) * self._angles
-        # Angles live in the parent's axes: an error stays alike while the body turns.
-        omega = torch.einsum("tpij,tpj->tpi", self._bases[rows], local)
-        rotation, _ = exp_se3(torch.cat([omega, torch.zeros_like(omega)], -1))
-        pivots = self._pivots[rows]
-        about = pivots - (rotation @ pivots[..., None])[..., 0]
-        own = torch.cat([rotation, about[..., None]], -1)
-        move = self._root_m * (mixing @ self.shifts)
-        root = torch.cat([own[:, :1, :, :3], own[:, :1, :, 3:] + move[:, None, :, None]], -1)
-        placed = root
-        for part, parent in self._levels:
-            above, below = placed[:, parent], own[:, part]
-            turned = above[..., :3] @ below
-            turned = torch.cat(
-                [turned[..., :3], turned[..., 3:] + above[..., 3:]], -1
-            )
-            placed = torch.cat([placed, turned], 1)
-        return placed
-
-    def vertices(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
-        transforms = self.transforms(rows)
-        moved = [
-            _blend(self._weights, transform, points)
-            for transform, points in zip(transforms, self._places[rows], strict=True)
-        ]
-        return torch.stack(moved).numpy()
-
-    def gather(self, rows: NDArray[np.int64], edges: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
-        """Weights (T, M, P) and estimated places (T, M, 3) of edge middles ``edges`` (T, M, 2)."""
-        weights = self._weights[edges].mean(2)
-        frames = torch.from_numpy(rows)[:, None, None]
-        return weights, self._places[frames, torch.from_numpy(edges)].mean(2)
-
-    def stand_off(self, weights: Tensor) -> Tensor:
-        """How far (T, M) clothes stand off the mesh, metres."""
-        return self._clothes_m * (weights @ self.clothes)
-
-
-def _blend(weights: Tensor, transforms: Tensor, points: Tensor) -> Tensor:
-    """Points (..., M, 3) moved by the weighted mean (..., M, P) of transforms (..., P, 3, 4)."""
-    mixed = (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))
-    return (mixed[..., :3] @ points[..., None])[..., 0] + mixed[..., 3]
-
-
-def _levels(parents: NDArray[np.int64]) -> list[tuple[Tensor, Tensor]]:
-    """Parts by generation below the root, whose order is kept, each with its parents."""
-    depth = np.zeros(len(parents), np.int64)
-    for part in range(1, len(parents)):
-        depth[part] = depth[parents[part]] + 1
-    return [
-        (torch.from_numpy(members), torch.from_numpy(parents[members]))
-        for members in (np.flatnonzero(depth == level) for level in range(1, depth.max() + 1))
-    ]
-
-
-def _smooth_mixing(
-    all_frames: NDArray[np.int32], frames: NDArray[np.int32], clip: Clip, seconds: float
-) -> Array:
-    """(T, S): turns independent unknowns at S frames into errors that stay alike for ``seconds``.
-
-    A row has length one, so that the errors keep the unknowns' usual size.
-    """
+def _no_correction(
+    skeleton: Articulation,
+    meshes: MeshSequence,
+    clip: Clip,
+    frames: NDArray[np.int32],
+    expected: float,
+    configuration: MaskFitConfig,
+) -> JointCorrection:
     kept = clip.frame_indices[~clip.held_out]
     stride = float(np.median(np.diff(kept))) if len(kept) > 1 else 1.0
-    lag = (all_frames[:, None] - frames[None]) / (stride * clip.fps * seconds)
-    mixing = np.exp(-np.minimum(lag**2, 200.0))
-    return mixing / np.maximum(np.linalg.norm(mixing, axis=1, keepdims=True), 1e-3)
+    rate = stride * clip.fps  # of the source's numbering
+    mixing = smooth_mixing(meshes.frame_indices / rate, frames / rate, configuration.error_seconds)
+    least, most = np.radians([configuration.stiff_error_deg, configuration.joint_error_deg])
+    angles = np.clip(skeleton.bend, least, most)
+    angles[0] = most
+    return JointCorrection(
+        skeleton,
+        meshes.vertices,
+        mixing,
+        expected * angles,
+        expected * configuration.root_error_m,
+        configuration.clothes_m,
+    )
+
+
+def _expected_share(
+    bodies: list[BodyOutline],
+    masks: list[MaskOutline],
+    camera: Camera,
+    configuration: MaskFitConfig,
+) -> float:
+    """How large errors are to be expected, in usual ones: 0 where the estimate fits already.
+
+    Clothes push the whole outline outward, so a distance that all points share says nothing.
+    """
+    focal = _focal(camera)
+    off = [np.zeros(0)]
+    for body, mask in zip(bodies, masks, strict=True):
+        pairs = _pairs(body, mask, focal, configuration)
+        apart = body.pixels[pairs.body] - mask.pixels[pairs.mask]
+        off.append((apart * mask.normals[pairs.mask]).sum(-1))
+    distances = np.concatenate(off)
+    if not len(distances):
+        return 0.0
+    apart_px = float(np.percentile(np.abs(distances - np.median(distances)), 75))
+    ramp = configuration.apart_px - configuration.agreeing_px
+    return float(np.clip((apart_px - configuration.agreeing_px) / ramp, 0.0, 1.0))
+
+
+def _focal(camera: Camera) -> float:
+    return float(np.sqrt(camera.K[0, 0] * camera.K[1, 1]))
+
+
+def _pairs(
+    body: BodyOutline, mask: MaskOutline, focal: float, configuration: MaskFitConfig
+) -> Matches:
+    depth = float(np.median(body.depth)) if len(body.depth) else 1.0
+    turn_px = configuration.turn_m * focal / depth
+    return match_outlines(body, mask, turn_px, configuration.least_agreement)
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +174,7 @@ class _Targets:
 
 
 def _find_targets(
-    correction: _Correction,
+    correction: JointCorrection,
     rows: NDArray[np.int64],
     outlines: list[MaskOutline],
     topology: EdgeTopology,
@@ -207,14 +183,11 @@ def _find_targets(
 ) -> _Targets:
     with torch.no_grad():
         posed = correction.vertices(rows)
-    focal = float(np.sqrt(camera.K[0, 0] * camera.K[1, 1]))
+    focal = _focal(camera)
     found = []
     for vertices, mask in zip(posed, outlines, strict=True):
         body = topology.outline(vertices, camera)
-        depth = float(np.median(body.depth)) if len(body.depth) else 1.0
-        pairs = match_outlines(
-            body, mask, configuration.turn_m * focal / depth, configuration.least_agreement
-        )
+        pairs = _pairs(body, mask, focal, configuration)
         found.append((body.edges[pairs.body], mask.pixels[pairs.mask], mask.normals[pairs.mask]))
     most = max(1, max(len(edges) for edges, _, _ in found))
     edges = np.zeros((len(rows), most, 2), np.int64)
@@ -230,7 +203,7 @@ def _find_targets(
 
 
 def _optimise(
-    correction: _Correction,
+    correction: JointCorrection,
     rows: NDArray[np.int64],
     outlines: list[MaskOutline],
     topology: EdgeTopology,
@@ -238,18 +211,20 @@ def _optimise(
     configuration: MaskFitConfig,
     progress: Progress,
 ) -> None:
-    optimiser = torch.optim.Adam(correction.unknowns(), configuration.rate)
+    optimiser = torch.optim.Adam(correction.unknowns(), configuration.rate, eps=_ADAM_EPSILON)
     steps = configuration.rounds * configuration.steps
     schedule = torch.optim.lr_scheduler.LambdaLR(
         optimiser, lambda step: 0.5 * (1.0 + np.cos(np.pi * step / steps))
     )
     for attempt in range(configuration.rounds):
         progress(attempt / configuration.rounds, "fitting the body to the masks")
+        share = attempt / max(configuration.rounds - 1, 1)
+        outlier_m = configuration.outlier_m ** (1.0 - share) * configuration.last_outlier_m**share
         targets = _find_targets(correction, rows, outlines, topology, camera, configuration)
         for _ in range(configuration.steps):
             optimiser.zero_grad()
             loss = correction.surprise() + _misfit(
-                correction, rows, targets, camera, configuration
+                correction, rows, targets, camera, outlier_m, configuration
             )
             loss.backward()
             optimiser.step()
@@ -257,17 +232,18 @@ def _optimise(
 
 
 def _misfit(
-    correction: _Correction,
+    correction: JointCorrection,
     rows: NDArray[np.int64],
     targets: _Targets,
     camera: Camera,
+    outlier_m: float,
     configuration: MaskFitConfig,
 ) -> Tensor:
     """Squared distances between the outlines over their usual square; far ones count less."""
     rotation, shift, intrinsics = (
         torch.from_numpy(np.asarray(part)).float() for part in (camera.R, camera.t, camera.K)
     )
-    world = _blend(targets.weights, correction.transforms(rows), targets.places)
+    world = blend(targets.weights, correction.transforms(rows), targets.places)
     points = world @ rotation.T + shift
     depth = points[..., 2:].clamp_min(0.05)
     pixels = (points @ intrinsics.T)[..., :2] / depth
@@ -275,7 +251,7 @@ def _misfit(
     off = ((pixels - targets.pixels) / focal * depth * targets.normals).sum(-1)
     off = off + correction.stand_off(targets.weights)
     squared = off * off
-    robust = squared / (1.0 + squared / configuration.outlier_m**2)
+    robust = squared / (1.0 + squared / outlier_m**2)
     per_frame = (targets.share * robust).sum(-1)
     return (
         0.5 * configuration.independent_points / configuration.outline_error_m**2 * per_frame.sum()
