@@ -53,7 +53,7 @@ def test_density_is_positive_bounded_and_falls_with_the_signed_distance(prior):
     assert float(middle / deepest) == pytest.approx(0.5, abs=1e-3)
 
 
-@pytest.mark.parametrize("log_sharpness", [-30.0, -5.0, 0.0])
+@pytest.mark.parametrize("log_sharpness", [-200.0, -30.0, -5.0, 0.0])
 def test_density_and_gradient_are_finite_at_any_distance_and_sharpness(prior, log_sharpness):
     canonical = scene_field(prior).canonical
     with torch.no_grad():
