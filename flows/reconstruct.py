@@ -21,6 +21,7 @@ from tasks.optimise_scene import optimise_scene
 from tasks.plan_scene import plan_scene
 from tasks.pretrain_density import pretrain_density
 from tasks.render_views import render_views
+from tasks.repair_body import repair_body
 from tasks.score_views import score_views
 from tasks.stage import Aside
 from tasks.training_clock import spent_on
@@ -70,16 +71,17 @@ def reconstruct(
     bodies = given
     if inspection.holds("location_search"):
         bodies = locate_body(where, clip, given, chosen.location)
-    plan = plan_scene(where, clip, bodies, inspection, chosen.plan)
-    density = pretrain_density(where, bodies, plan, chosen.density)
-    motion = fit_motion(where, clip, bodies, plan, density, chosen.motion)
+    repaired = repair_body(where, clip, bodies, chosen.repair)
+    plan = plan_scene(where, clip, repaired, inspection, chosen.plan)
+    density = pretrain_density(where, repaired, plan, chosen.density)
+    motion = fit_motion(where, clip, repaired, plan, density, chosen.motion)
     trained = optimise_scene(
         where,
         clip,
         plan,
         density,
         motion,
-        spent_on(clip, given, inspection, bodies, plan, density, motion),
+        spent_on(clip, given, inspection, bodies, repaired, plan, density, motion),
         chosen.canonical,
         chosen.motion,
         chosen.sampling,
@@ -97,7 +99,7 @@ def reconstruct(
         where, name, seed, views, trained, clip, evaluation, bodies, chosen.evaluation, chosen.truth
     )
 
-    stages = (clip, given, inspection, bodies, plan, density, motion, trained)
+    stages = (clip, given, inspection, bodies, repaired, plan, density, motion, trained)
     stages += (evaluation, views, scores)
     facts = describe_run(clip, evaluation, trained, scores, stages, perf_counter() - start)
     known = folder.begun.model_copy(update=facts)

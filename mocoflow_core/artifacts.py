@@ -59,6 +59,12 @@ class LocationArtifact(Artifact):
     stage = "locate_body"
 
 
+class RepairArtifact(Artifact):
+    """The meshes bent towards the masks: what training starts from."""
+
+    stage = "repair_body"
+
+
 class PlanArtifact(Artifact):
     stage = "plan_scene"
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mocoflow_core.body.location import LocationConfig
+from mocoflow_core.body.mask_fit import MaskFitConfig
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
+from mocoflow_core.fields.motion_body import BodyMotionConfig
 from mocoflow_core.fields.scene_shape import MotionConfig
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.methods.presentation import PresentationConfig
@@ -24,6 +26,7 @@ class Configuration(ConfigurationPart):
 
     capture: CaptureConfig = CaptureConfig()
     location: LocationConfig = LocationConfig()
+    repair: MaskFitConfig = MaskFitConfig()
     plan: PlanConfig = PlanConfig()
     density: DensityConfig = DensityConfig()
     motion: MotionConfig = MotionConfig()
@@ -42,8 +45,12 @@ def fast() -> Configuration:
 
 
 def toy() -> Configuration:
-    """A few steps, for tests."""
+    """A few steps on coarse grids, for tests."""
     return Configuration(
+        density=DensityConfig(spacing_m=0.03),
+        motion=MotionConfig(body=BodyMotionConfig(node_spacing_m=0.1, control_spacing_m=0.08)),
+        canonical=CanonicalConfig(finest_m=0.04, levels=2),
+        sampling=SamplingConfig(step_m=0.03),
         schedule=ScheduleConfig(coarse_steps=10, fine_steps=10, rays=64, threads=1),
         presentation=PresentationConfig(turntable_views=4),
     )

@@ -11,7 +11,7 @@ import torch
 
 # All cores have to be at least so much faster than one: their threads wait for each other in a
 # spin, so a core that gets busy later costs far more than the second one ever brought.
-_WORTH_IT = 1.3
+_WORTH_IT = 1.5
 _REPEATS = 4
 
 

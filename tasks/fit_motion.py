@@ -7,10 +7,9 @@ from dataclasses import asdict
 from mocoflow_core.artifacts import (
     ClipArtifact,
     DensityArtifact,
-    LocationArtifact,
-    MeshArtifact,
     MotionArtifact,
     PlanArtifact,
+    RepairArtifact,
 )
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
@@ -27,7 +26,7 @@ ALGORITHM_VERSION = 1  # First version.
 def fit_motion(
     work: Stage,
     clip: ClipArtifact,
-    bodies: MeshArtifact | LocationArtifact,
+    bodies: RepairArtifact,
     plan: PlanArtifact,
     density: DensityArtifact,
     motion: MotionConfig,

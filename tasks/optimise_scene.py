@@ -60,6 +60,7 @@ def optimise_scene(
             shell_width_m=decided.shell_width_m,
             inner_depth_m=sampling.inner_depth_m,
             step_m=sampling.step_m,
+            residual=decided.needs("motion_residual"),
             light=decided.light,
         ),
         Learned(

@@ -5,9 +5,8 @@ from __future__ import annotations
 from mocoflow_core.artifacts import (
     ClipArtifact,
     InspectionArtifact,
-    LocationArtifact,
-    MeshArtifact,
     PlanArtifact,
+    RepairArtifact,
 )
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
@@ -23,7 +22,7 @@ ALGORITHM_VERSION = 1  # First version.
 def plan_scene(
     work: Stage,
     clip: ClipArtifact,
-    bodies: MeshArtifact | LocationArtifact,
+    bodies: RepairArtifact,
     inspection: InspectionArtifact,
     plan: PlanConfig,
 ) -> Summary:

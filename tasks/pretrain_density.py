@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocoflow_core.artifacts import DensityArtifact, LocationArtifact, MeshArtifact, PlanArtifact
+from mocoflow_core.artifacts import DensityArtifact, PlanArtifact, RepairArtifact
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.training import pretrain_density as training
@@ -15,7 +15,7 @@ ALGORITHM_VERSION = 1  # First version.
 @stage(DensityArtifact, ALGORITHM_VERSION)
 def pretrain_density(
     work: Stage,
-    bodies: MeshArtifact | LocationArtifact,
+    bodies: RepairArtifact,
     plan: PlanArtifact,
     density: DensityConfig,
 ) -> Summary:

@@ -36,6 +36,7 @@ class HybridMotion(nn.Module):
         """Args: times (F,) of the training frames, normalised, ascending."""
         super().__init__()
         self.register_buffer("times", times.double(), persistent=False)
+        self.corrects = True  # false: the body's motion is right already, no network is asked
         self.codes = nn.Parameter(0.1 * torch.randn(len(times), configuration.code_width))
         self.residual_to_canonical = ResidualMotion(centre, radius, configuration)
         self.residual_to_observed = ResidualMotion(centre, radius, configuration)
@@ -50,6 +51,8 @@ class HybridMotion(nn.Module):
 
     def correct(self, body_canonical: Tensor, row: Tensor, moments: Moments) -> Tensor:
         """Where canonical points of the body's motion really lie, (P, 3)."""
+        if not self.corrects:
+            return body_canonical
         return self.residual_to_canonical(body_canonical, moments.codes[row])
 
     def to_canonical(self, points: Tensor, row: Tensor, moments: Moments) -> Tensor:
@@ -58,7 +61,9 @@ class HybridMotion(nn.Module):
 
     def to_observed(self, points: Tensor, row: Tensor, moments: Moments) -> tuple[Tensor, Tensor]:
         """Canonical points (P, 3) to the space of their moments; and where the body is near."""
-        return moments.body.to_observed(self.residual_to_observed(points, moments.codes[row]), row)
+        if self.corrects:
+            points = self.residual_to_observed(points, moments.codes[row])
+        return moments.body.to_observed(points, row)
 
 
 def interpolate_rows(values: Tensor, at: Tensor, times: Tensor) -> Tensor:

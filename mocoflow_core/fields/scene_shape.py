@@ -32,6 +32,7 @@ class SceneShape(ConfigurationPart):
     shell_width_m: float = Field(gt=0)
     inner_depth_m: float = Field(gt=0)
     step_m: float = Field(gt=0, description="distance between samples")
+    residual: bool = Field(True, description="whether the body's motion is corrected at all")
     light: tuple[float, float, float] = Field(
         (0.0, 0.0, 0.0), description="linear brightness is 1 + light . normal, world space"
     )
@@ -44,6 +45,7 @@ class SceneShape(ConfigurationPart):
         motion = HybridMotion(
             torch.tensor(self.times, dtype=torch.float64), centre, radius, self.motion.residual
         )
+        motion.corrects = self.residual
         light = FixedLight(self.light)
         return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, light))
 

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.rigid_controls import rigid_controls
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion
 from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.methods.rendered_views import TrainedRenderer
 from mocoflow_core.methods.scored_views import Subject
@@ -26,6 +28,7 @@ from mocoflow_core.metrics.keypoints import (
     regress_keypoints,
 )
 from mocoflow_core.metrics.table import ScoreRow
+from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
 
 Points = NDArray[np.float64]
 
@@ -38,21 +41,43 @@ class TruthConfig(ConfigurationPart):
     seed: int = Field(0, ge=0, description="Draws the pairs.")
 
 
-@dataclass(frozen=True)
-class BodyOnlyMotion:
-    """The motion of the given mesh, spread into space: what there was before."""
+class GivenMotion:
+    """The motion of the given meshes, spread into space: what there was before."""
 
-    renderer: TrainedRenderer
+    def __init__(self, renderer: TrainedRenderer, clip: Clip, given: MeshSequence) -> None:
+        """``given`` at the clip's frames, as they came."""
+        self._shape = renderer.scene.shape
+        self._rows = {int(index): row for row, index in enumerate(clip.frame_indices)}
+        density = pretrain_density(given, int(clip.frame_indices[0]), DensityConfig())
+        self._prior = density.prior()
+        body = self._shape.motion.body
+        self._controls = rigid_controls(
+            density.vertices,
+            given.vertices,
+            given.faces,
+            clip.times,
+            body.control_spacing_m,
+            body.neighbours,
+        )
+        self._bodies: dict[int, BodyMotion] = {}
 
     def to_canonical(self, points: Points, frame_index: int) -> Points:
-        moments = _moments(self.renderer, frame_index)
         row = torch.zeros(len(points), dtype=torch.int64)
-        return _array(moments.body.to_canonical(_tensor(points), row)[0])
+        return _array(self._body(frame_index).to_canonical(_tensor(points), row)[0])
 
     def to_observed(self, points: Points, frame_index: int) -> Points:
-        moments = _moments(self.renderer, frame_index)
         row = torch.zeros(len(points), dtype=torch.int64)
-        return _array(moments.body.to_observed(_tensor(points), row)[0])
+        return _array(self._body(frame_index).to_observed(_tensor(points), row)[0])
+
+    def _body(self, frame_index: int) -> BodyMotion:
+        if frame_index not in self._bodies:
+            self._bodies[frame_index] = build_body_motion(
+                self._controls.frames(np.array([self._rows[frame_index]])),
+                self._prior,
+                self._shape.shell_width_m,
+                self._shape.motion.body,
+            )
+        return self._bodies[frame_index]
 
 
 @dataclass(frozen=True)
@@ -74,7 +99,7 @@ class LearnedMotion:
         return _array(motion.to_observed(_tensor(points), row, moments)[0])
 
 
-Motion = BodyOnlyMotion | LearnedMotion
+Motion = GivenMotion | LearnedMotion
 
 
 def motion_rows(
@@ -96,12 +121,12 @@ def motion_rows(
     canonical = canonical_vertices.astype(np.float64)
     placed = np.stack([learned.to_observed(canonical, int(i)) for i in clip.frame_indices])
     states = (
-        ("posed_mesh", BodyOnlyMotion(renderer), given.vertices.astype(np.float64)),
+        ("posed_mesh", GivenMotion(renderer, clip, given), given.vertices.astype(np.float64)),
         ("mocoflow", learned, placed),
     )
     rows = []
     for method, motion, vertices in states:
-        measured = [*_consensus(motion, clip, given, configuration)]
+        measured = [*_consensus(motion, clip, vertices, configuration)]
         if truth is not None:
             measured += _against_truth(
                 motion, clip, vertices, given.keypoint_regressor, truth, configuration
@@ -127,12 +152,12 @@ Measured = tuple[str, int, float]  # metric, frame_index, value
 
 
 def _consensus(
-    motion: Motion, clip: Clip, given: MeshSequence, configuration: TruthConfig
+    motion: Motion, clip: Clip, vertices: Points, configuration: TruthConfig
 ) -> Iterator[Measured]:
-    """Over points on the given body, each frame with one drawn partner."""
+    """Over points on the body (T, V, 3), each frame with one drawn partner."""
     partner = {end: start for start, end in draw_pairs(clip.frame_indices, 1, configuration.seed)}
     for row, frame_index in enumerate(clip.frame_indices.tolist()):
-        points = _spread(given.vertices[row].astype(np.float64), configuration.points)
+        points = _spread(vertices[row], configuration.points)
         maps = (motion.to_canonical, motion.to_observed)
         yield "consensus_local_mm", frame_index, consensus_local_mm(points, frame_index, *maps)
         if frame_index in partner:

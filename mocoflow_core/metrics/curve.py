@@ -31,6 +31,7 @@ CLOCKED_STAGES = (
     "fit_body",
     "ingest_meshes",
     "locate_body",
+    "repair_body",
     "inspect_scene",
     "plan_scene",
     "pretrain_density",

@@ -123,10 +123,11 @@ class TrainingRun:
             self.guard.refuse(step, problem)
             self.progress.rate_scale = self.guard.rate_scale
             return
-        self.optimiser.step()
-        self._losses.append({name: float(value.detach()) for name, value in terms.items()})
+        # These weights have just given finite losses and gradients; the next ones are unknown.
         if step % _REMEMBER_EVERY == 0:
             self.guard.remember()
+        self.optimiser.step()
+        self._losses.append({name: float(value.detach()) for name, value in terms.items()})
 
     def _fit_budget(self) -> None:
         """Shorten the schedule so that the training clock ends within the budget."""
