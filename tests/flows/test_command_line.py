@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flows.command_line import main
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -29,12 +31,27 @@ def mocoflow(*arguments, timeout=120):
     )
 
 
-def refuse(*arguments, because):
-    """Runs it, and expects exit code 2 with one line on stderr that names the reason."""
-    run = mocoflow(*arguments)
-    assert run.returncode == 2, run.stderr
-    assert len(run.stderr.strip().splitlines()) == 1, run.stderr
-    assert because in run.stderr
+def one_line_because(errors, reason):
+    assert len(errors.strip().splitlines()) == 1, errors
+    assert reason in errors
+
+
+@pytest.fixture
+def refuse(monkeypatch, capsys):
+    """Runs it, and expects exit code 2 with one line on stderr that names the reason.
+
+    In this process, which has loaded everything already.
+    """
+
+    def run(*arguments, because):
+        monkeypatch.setattr(sys, "argv", ["mocoflow", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        errors = capsys.readouterr().err
+        assert ended.value.code == 2, errors
+        one_line_because(errors, because)
+
+    return run
 
 
 @pytest.fixture
@@ -68,27 +85,27 @@ def test_help_loads_neither_torch_nor_prefect():
     assert run.stdout.strip() == "set()"
 
 
-def test_an_unknown_field_is_refused_with_the_closest_one(toy_scene, tmp_path):
+def test_an_unknown_field_is_refused_with_the_closest_one(refuse, toy_scene, tmp_path):
     refuse(
         *("reconstruct", toy_scene, "--out", tmp_path / "out", "--set", "schedule.fine_step=3"),
         because="schedule.fine_steps",
     )
 
 
-def test_a_value_that_its_field_refuses_is_named(toy_scene, tmp_path):
+def test_a_value_that_its_field_refuses_is_named(refuse, toy_scene, tmp_path):
     refuse(
         *("reconstruct", toy_scene, "--out", tmp_path / "out", "--set", "schedule.rays=0"),
         because="schedule.rays",
     )
 
 
-def test_a_folder_that_holds_something_else_is_refused_and_left_alone(toy_scene, tmp_path):
+def test_a_folder_that_holds_something_else_is_refused_and_left_alone(refuse, toy_scene, tmp_path):
     (tmp_path / "thesis.txt").write_text("precious")
     refuse("reconstruct", toy_scene, "--out", tmp_path, because="something else")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
 
-def test_a_folder_of_other_settings_is_refused(first_run, toy_scene, store_url):
+def test_a_folder_of_other_settings_is_refused(refuse, first_run, toy_scene, store_url):
     out, _ = first_run
     refuse(
         *("reconstruct", toy_scene, "--preset", "toy", "--store", store_url),
@@ -106,22 +123,22 @@ def test_a_finished_folder_is_found_finished(first_run, toy_scene, store_url):
     assert "Already finished" in run.stdout
 
 
-def test_a_scene_that_is_not_there_is_refused(tmp_path):
+def test_a_scene_that_is_not_there_is_refused(refuse, tmp_path):
     refuse("reconstruct", tmp_path / "nothing", "--out", tmp_path / "out", because="scene.json")
 
 
-def test_a_preset_that_does_not_exist_is_refused(toy_scene, tmp_path):
+def test_a_preset_that_does_not_exist_is_refused(refuse, toy_scene, tmp_path):
     refuse(
         "reconstruct", toy_scene, "--preset", "fats", "--out", tmp_path / "out", because="fast, toy"
     )
 
 
-def test_a_matrix_that_is_no_rotation_is_refused(scene, describe, tmp_path):
+def test_a_matrix_that_is_no_rotation_is_refused(refuse, scene, describe, tmp_path):
     describe(lambda d: d["cameras"]["cam00"]["R"][0].reverse())
     refuse("reconstruct", scene, "--out", tmp_path / "out", because="rotation")
 
 
-def test_a_missing_mesh_file_is_refused(toy_scene, tmp_path):
+def test_a_missing_mesh_file_is_refused(refuse, toy_scene, tmp_path):
     refuse(
         *("reconstruct", toy_scene, "--out", tmp_path / "out", "--meshes", tmp_path / "no.npz"),
         because="--meshes",
@@ -205,11 +222,12 @@ def test_a_damaged_scene_is_bad_input(damage, because, scene, describe, refuse_i
 
 def test_bad_input_found_by_a_stage_ends_with_exit_code_2(scene, describe, tmp_path):
     with_meshes_in_millimetres(scene, describe)
-    refuse(
+    run = mocoflow(
         *("reconstruct", scene, "--preset", "toy", "--out", tmp_path / "out"),
         *("--store", tmp_path / "store"),
-        because="m",
     )
+    assert run.returncode == 2, run.stderr
+    one_line_because(run.stderr, "m")
 
 
 def test_the_same_render_command_gives_the_same_picture(first_run, tmp_path):
@@ -239,10 +257,10 @@ def test_a_rendered_frame_is_the_scored_view(first_run, tmp_path):
         ("--rotate", "1,2", "Three numbers"),
     ],
 )
-def test_a_view_that_cannot_be_is_refused(first_run, tmp_path, option, value, because):
+def test_a_view_that_cannot_be_is_refused(refuse, first_run, tmp_path, option, value, because):
     out, _ = first_run
     refuse("render", out, option, value, "--out", tmp_path / "views", because=because)
 
 
-def test_rendering_a_folder_without_a_run_is_refused(tmp_path):
+def test_rendering_a_folder_without_a_run_is_refused(refuse, tmp_path):
     refuse("render", tmp_path, "--out", tmp_path / "views", because="run.json")
