@@ -23,7 +23,7 @@ class PresentationConfig(ConfigurationPart):
     """What is shown besides the scored views."""
 
     side_deg: float = Field(90.0, description="The novel view: so far around the body, degrees.")
-    turntable_views: int = Field(48, ge=2, description="Pictures of one full turn.")
+    turntable_views: int = Field(36, ge=2, description="Pictures of one full turn.")
     turntable_fps: float = Field(12.0, gt=0, description="Pictures per second of the turntable.")
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 
 import numpy as np
+import skimage
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -33,7 +33,7 @@ class EvaluationConfig(ConfigurationPart):
         0.5, gt=0.0, lt=1.0, description="A rendered pixel above this opacity is the person."
     )
     frames_per_camera: int = Field(
-        24, ge=1, description="Scored frames of each camera at the end, evenly spread in time."
+        12, ge=1, description="Scored frames of each camera at the end, evenly spread in time."
     )
     curve_views: int = Field(
         8, ge=1, description="Views scored at each point of the error curve, drawn once by seed."
@@ -62,7 +62,7 @@ def protocol(configuration: EvaluationConfig, side: int, notes: Sequence[str] = 
         "PSNR of sRGB values; psnr, ssim over the crop, psnr_union over both masks, "
         "psnr_image over the whole image",
         f"SSIM: Gaussian window {WINDOW_PX} px, sigma {SIGMA_PX}, scikit-image "
-        f"{version('scikit-image')}",
+        f"{skimage.__version__}",
         *notes,
     ]
     return "; ".join(facts)
