@@ -17,6 +17,7 @@ STAGES = [
     "extract_clip",
     "ingest_meshes",
     "inspect_scene",
+    "repair_body",
     "plan_scene",
     "pretrain_density",
     "fit_motion",
@@ -47,7 +48,7 @@ def test_a_run_leaves_everything_that_a_user_keeps(first_run):
 
 def test_the_training_clock_of_the_curve_starts_after_the_preparation(first_run):
     out, record = first_run
-    preparation = STAGES[:6]
+    preparation = STAGES[: STAGES.index("optimise_scene")]
     spent = sum(record.stage(name).wall_s for name in preparation)
     curve = read_curve(out / "error_curve.parquet")
     assert min(row.wall_s for row in curve if row.method == "mocoflow") > spent
