@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import version
 
 import numpy as np
-import skimage
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -17,6 +17,7 @@ from mocoflow_core.metrics.psnr import psnr
 from mocoflow_core.metrics.ssim import SIGMA_PX, WINDOW_PX, ssim
 
 WHITE = 1.0
+_SCIKIT_IMAGE = version("scikit-image")
 
 
 class EvaluationConfig(ConfigurationPart):
@@ -61,8 +62,7 @@ def protocol(configuration: EvaluationConfig, side: int, notes: Sequence[str] = 
         f"render's mask: opacity above {configuration.opacity_threshold:g}",
         "PSNR of sRGB values; psnr, ssim over the crop, psnr_union over both masks, "
         "psnr_image over the whole image",
-        f"SSIM: Gaussian window {WINDOW_PX} px, sigma {SIGMA_PX}, scikit-image "
-        f"{skimage.__version__}",
+        f"SSIM: Gaussian window {WINDOW_PX} px, sigma {SIGMA_PX}, scikit-image {_SCIKIT_IMAGE}",
         *notes,
     ]
     return "; ".join(facts)
