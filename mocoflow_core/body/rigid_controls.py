@@ -25,7 +25,7 @@ _GLOBAL_PULL = 1e-3
 _ONE_POINT = 1e-8
 
 _FILE = "controls.safetensors"
-_PARTS = ("times", "canonical", "observed", "rotations", "surface", "surface_control")
+_PARTS = ("times", "canonical", "observed", "rotations", "surface", "surface_control", "ever_apart")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,7 @@ class RigidControls:
     rotations: Array  # (T, K, 3, 3) canonical -> observed
     surface: Array  # (S, 3) dense points of the canonical surface
     surface_control: NDArray[np.int64]  # (S,) nearest control of each surface point
+    ever_apart: Array  # (K, K) largest distance that two controls ever have, metres
 
     def frames(self, rows: NDArray[np.int64]) -> RigidControls:
         """Only the given frames."""
@@ -56,16 +57,6 @@ class RigidControls:
         k = self.surface_control
         moved = np.einsum("sij,sj->si", self.rotations[row, k], self.surface - self.canonical[k])
         return (moved + self.observed[row, k]).astype(np.float32)
-
-    def largest_distances(self) -> Array:
-        """(K, K): the largest distance that two controls ever have, over canonical and all frames.
-
-        Controls that touch in one frame only are told apart from true neighbours by it.
-        """
-        largest = _pairwise(self.canonical)
-        for observed in self.observed:
-            np.maximum(largest, _pairwise(observed), out=largest)
-        return largest
 
     def at_time(self, time: float) -> RigidControls:
         """The controls at one moment, interpolated between frames.
@@ -149,6 +140,7 @@ def rigid_controls(
         rotations,
         surface.astype(np.float32),
         surface_control.astype(np.int64),
+        _ever_apart(centre.astype(np.float32), observed),
     )
 
 
@@ -224,6 +216,17 @@ def _slerp(before: Array, after: Array, share: float) -> Array:
     start = Rotation.from_matrix(before)
     step = (start.inv() * Rotation.from_matrix(after)).as_rotvec()
     return (start * Rotation.from_rotvec(share * step)).as_matrix().astype(np.float32)
+
+
+def _ever_apart(canonical: Array, observed: Array) -> Array:
+    """Over the canonical mesh and all frames, never over one moment alone.
+
+    Controls that touch in one frame only are told apart from true neighbours by it.
+    """
+    largest = _pairwise(canonical)
+    for frame in observed:
+        np.maximum(largest, _pairwise(frame), out=largest)
+    return largest
 
 
 def _pairwise(points: Array) -> Array:

@@ -202,7 +202,7 @@ def build_body_motion(
     spacing = configuration.node_spacing_m
     # A point within reach must find all eight corners of its cell.
     node_reach = reach + spacing * np.sqrt(3.0)
-    ever_apart = controls.largest_distances()
+    ever_apart = controls.ever_apart
     lattices, maps, distances, facing = [], [], [], []
     for row in range(len(controls.times)):
         nodes, lattice, distance = _nodes_near(controls.surface_at(row), spacing, node_reach)

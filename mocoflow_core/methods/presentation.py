@@ -53,7 +53,8 @@ def render_turntable(
     progress: Progress,
 ) -> None:
     """One turn around the body while the whole clip plays, as a video."""
-    times = np.linspace(0.0, 1.0, configuration.turntable_views)
+    rows = np.linspace(0, len(clip.times) - 1, configuration.turntable_views).round().astype(int)
+    times = clip.times[rows]
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
         for number, camera in enumerate(orbit(scene, clip.camera, up, times)):

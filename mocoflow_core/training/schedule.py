@@ -11,8 +11,8 @@ class ScheduleConfig(ConfigurationPart):
     """Steps and rates. A step is one update of the optimiser, on however many devices."""
 
     fit_steps: int = Field(0, ge=0, description="N1: fit_motion with density frozen")
-    coarse_steps: int = Field(600, ge=0, description="N2: joint, bands fading in")
-    fine_steps: int = Field(300, ge=0, description="N3: joint, all bands on")
+    coarse_steps: int = Field(500, ge=0, description="N2: joint, bands fading in")
+    fine_steps: int = Field(250, ge=0, description="N3: joint, all bands on")
     rays: int = Field(768, ge=1, description="rays of one step")
     frames_per_step: int = Field(4, ge=1, description="frames that the rays of a step come from")
     rate_features: float = Field(2e-2, gt=0, description="feature grids")

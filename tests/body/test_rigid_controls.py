@@ -175,7 +175,7 @@ def test_moments_change_continuously_through_a_frame(rigid):
 def test_distances_between_controls_are_the_largest_that_ever_occur():
     mesh = figure()
     found = measured(mesh, [mesh.vertices, mesh.vertices * [2, 1, 1], mesh.vertices * 0.5])
-    largest = found.largest_distances()
+    largest = found.ever_apart
     stretched = found.observed[1].astype(np.float64)
     expected = np.linalg.norm(stretched[:, None] - stretched[None], axis=-1)
     # The expanded square loses half of the digits where two controls are close.
