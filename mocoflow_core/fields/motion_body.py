@@ -7,6 +7,8 @@ is one trilinear look-up.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -186,45 +188,52 @@ def _blend(maps: Tensor, weights: Tensor, points: Tensor, apart: float) -> Tenso
     return (mapped * (agreeing / total)[..., None]).sum(1)
 
 
+Lattice = tuple[Array, NDArray[np.int64], NDArray[np.bool_]]  # origin, shape, occupied
+Blending = tuple[NDArray[np.int64], Array]  # controls near each node (N, K), their weights (N, K)
+
+
+@dataclass(frozen=True, eq=False)
+class CanonicalNodes:
+    """The lattice around the canonical body."""
+
+    nodes: Array  # (M, 3)
+    lattice: Lattice
+    blending: Blending
+
+
 def build_body_motion(
     controls: RigidControls,
     prior: SignedDistancePrior,
     reach: float,
     configuration: BodyMotionConfig,
+    canonical: CanonicalNodes | None = None,
 ) -> BodyMotion:
     """Blend the controls' rigid motion onto lattices around the body.
 
     Args:
         controls: the mesh's motion; every one of its frames gets a lattice.
-        prior: the canonical mesh, for the direction that surfaces face.
+        prior: the canonical mesh, for the side and the direction of surfaces.
         reach: how far from the mesh points will be asked for, metres.
+        canonical: ``canonical_nodes`` of the same controls, where the caller keeps them.
     """
     spacing = configuration.node_spacing_m
-    # A point within reach must find all eight corners of its cell.
-    node_reach = reach + spacing * np.sqrt(3.0)
-    ever_apart = controls.ever_apart
+    node_reach = _node_reach(reach, configuration)
+    canonical = canonical or canonical_nodes(controls, reach, configuration)
     lattices, maps, distances, facing = [], [], [], []
     for row in range(len(controls.times)):
         nodes, lattice, distance = _nodes_near(controls.surface_at(row), spacing, node_reach)
         inverse = np.swapaxes(controls.rotations[row], -1, -2)
         source, target = controls.observed[row], controls.canonical
+        blending = _blending(nodes, source, controls.ever_apart, configuration)
         lattices.append(lattice)
         distances.append(distance)
-        maps.append(_node_maps(nodes, source, target, inverse, ever_apart, configuration))
+        maps.append(_node_maps(nodes, source, target, inverse, blending))
         inside, normals = _side_and_normals(nodes, maps[-1], prior)
         distances[-1][inside] *= -1.0
         facing.append(normals)
-    canonical_nodes, canonical_lattice, _ = _nodes_near(controls.surface, spacing, node_reach)
     canonical_maps = [
-        _node_maps(
-            canonical_nodes,
-            controls.canonical,
-            controls.observed[row],
-            controls.rotations[row],
-            ever_apart,
-            configuration,
-        )
-        for row in range(len(controls.times))
+        _node_maps(canonical.nodes, controls.canonical, observed, rotations, canonical.blending)
+        for observed, rotations in zip(controls.observed, controls.rotations, strict=True)
     ]
     return BodyMotion(
         torch.from_numpy(controls.times),
@@ -232,12 +241,24 @@ def build_body_motion(
         torch.from_numpy(np.concatenate(maps)),
         torch.from_numpy(np.concatenate(distances)),
         torch.cat(facing),
-        _pack([canonical_lattice], spacing),
+        _pack([canonical.lattice], spacing),
         torch.from_numpy(np.stack(canonical_maps)),
     )
 
 
-Lattice = tuple[Array, NDArray[np.int64], NDArray[np.bool_]]  # origin, shape, occupied
+def canonical_nodes(
+    controls: RigidControls, reach: float, configuration: BodyMotionConfig
+) -> CanonicalNodes:
+    """The canonical lattice and its blending, which are the same at every moment."""
+    node_reach = _node_reach(reach, configuration)
+    nodes, lattice, _ = _nodes_near(controls.surface, configuration.node_spacing_m, node_reach)
+    blending = _blending(nodes, controls.canonical, controls.ever_apart, configuration)
+    return CanonicalNodes(nodes, lattice, blending)
+
+
+def _node_reach(reach: float, configuration: BodyMotionConfig) -> float:
+    """A point within reach must find all eight corners of its cell."""
+    return float(reach + configuration.node_spacing_m * np.sqrt(3.0))
 
 
 def _nodes_near(surface: Array, spacing: float, reach: float) -> tuple[Array, Lattice, Array]:
@@ -252,22 +273,24 @@ def _nodes_near(surface: Array, spacing: float, reach: float) -> tuple[Array, La
     return positions[occupied], lattice, distance[occupied].astype(np.float32)
 
 
-def _node_maps(
-    nodes: Array,
-    source: Array,
-    target: Array,
-    rotations: Array,
-    ever_apart: Array,
-    configuration: BodyMotionConfig,
-) -> Array:
-    """Affine maps (N, 4, 3) of nodes from the rigid motion of the controls near them."""
+def _blending(
+    nodes: Array, source: Array, ever_apart: Array, configuration: BodyMotionConfig
+) -> Blending:
+    """The controls (K, 3) that carry each node (N, 3), and with which weights."""
     count = min(configuration.blend_count, len(source))
     distance, near = cKDTree(source).query(nodes, k=count)
     distance, near = distance.reshape(-1, count), near.reshape(-1, count)
     excess = distance**2 - distance[:, :1] ** 2
     weights = np.exp(-excess / (2.0 * configuration.blend_width_m**2))
     weights *= ever_apart[near[:, :1], near] < configuration.stay_within_m
-    weights = (weights / weights.sum(1, keepdims=True)).astype(np.float32)
+    return near, (weights / weights.sum(1, keepdims=True)).astype(np.float32)
+
+
+def _node_maps(
+    nodes: Array, source: Array, target: Array, rotations: Array, blending: Blending
+) -> Array:
+    """Affine maps (N, 4, 3) of nodes from the rigid motion of the controls near them."""
+    near, weights = blending
     blended = _nearest_rotation(np.einsum("nk,nkij->nij", weights, rotations[near]))
     moved = np.einsum("nkij,nkj->nki", rotations[near], nodes[:, None] - source[near])
     mapped = np.einsum("nk,nki->ni", weights, moved + target[near])

@@ -15,7 +15,7 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rigid_controls import rigid_controls
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion
+from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion, canonical_nodes
 from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.methods.rendered_views import TrainedRenderer
 from mocoflow_core.methods.scored_views import Subject
@@ -59,6 +59,7 @@ class GivenMotion:
             body.control_spacing_m,
             body.neighbours,
         )
+        self._canonical = canonical_nodes(self._controls, self._shape.shell_width_m, body)
         self._bodies: dict[int, BodyMotion] = {}
 
     def to_canonical(self, points: Points, frame_index: int) -> Points:
@@ -76,6 +77,7 @@ class GivenMotion:
                 self._prior,
                 self._shape.shell_width_m,
                 self._shape.motion.body,
+                self._canonical,
             )
         return self._bodies[frame_index]
 

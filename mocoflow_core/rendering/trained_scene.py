@@ -13,7 +13,7 @@ from torch import Tensor
 
 from mocoflow_core.body.rigid_controls import RigidControls
 from mocoflow_core.fields.canonical_density import CanonicalDensity
-from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion
+from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion, canonical_nodes
 from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.scene_shape import SceneShape
@@ -46,6 +46,7 @@ class TrainedScene:
         self.sampling = sampling
         self.threads = threads  # as many as the optimisation found worth it
         self._bodies: dict[float, BodyMotion] = {}
+        self._canonical = canonical_nodes(controls, shape.shell_width_m, shape.motion.body)
 
     def share_bodies(self, other: TrainedScene) -> None:
         """Take over the moments that another state of the same scene has already prepared."""
@@ -59,6 +60,7 @@ class TrainedScene:
                 self.field.canonical.prior,
                 self.shape.shell_width_m,
                 self.shape.motion.body,
+                self._canonical,
             )
         codes = self.field.motion.codes_at(torch.tensor([time]))
         return Moments(self._bodies[time], codes)
