@@ -8,8 +8,8 @@ from mocoflow_core.body.location import LocationConfig
 from mocoflow_core.body.mask_fit import MaskFitConfig
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
-from mocoflow_core.fields.motion_body import BodyMotionConfig
 from mocoflow_core.fields.scene_shape import MotionConfig
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.methods.presentation import PresentationConfig

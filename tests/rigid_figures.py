@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from mocoflow_core.body.rigid_controls import RigidControls, rigid_controls
 from mocoflow_core.body.signed_distance import signed_distance_lattice
-from mocoflow_core.fields.motion_body import BodyMotion, BodyMotionConfig, build_body_motion
+from mocoflow_core.fields.body_lattices import BodyMotionConfig, build_body_motion
+from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
 
 REACH_M = 0.08

@@ -7,9 +7,9 @@ from pydantic import Field
 from torch import Tensor
 
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_grid import CanonicalConfig, CanonicalGrid, nested_grids
 from mocoflow_core.fields.lighting import FixedLight
-from mocoflow_core.fields.motion_body import BodyMotionConfig
 from mocoflow_core.fields.motion_hybrid import HybridMotion
 from mocoflow_core.fields.motion_residual import ResidualConfig
 from mocoflow_core.fields.scene_field import SceneField

@@ -15,7 +15,8 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rigid_controls import rigid_controls
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion, canonical_nodes
+from mocoflow_core.fields.body_lattices import build_body_motion, canonical_nodes
+from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.methods.rendered_views import TrainedRenderer
 from mocoflow_core.methods.scored_views import Subject

@@ -12,8 +12,9 @@ from safetensors.torch import load_file
 from torch import Tensor
 
 from mocoflow_core.body.rigid_controls import RigidControls
+from mocoflow_core.fields.body_lattices import build_body_motion, canonical_nodes
 from mocoflow_core.fields.canonical_density import CanonicalDensity
-from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion, canonical_nodes
+from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.scene_shape import SceneShape

@@ -19,8 +19,9 @@ from safetensors.torch import load_file, save_file
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rigid_controls import RigidControls, rigid_controls
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.fields.body_lattices import build_body_motion
 from mocoflow_core.fields.canonical_density import CanonicalDensity
-from mocoflow_core.fields.motion_body import BodyMotion, build_body_motion
+from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.scene_shape import MotionConfig
 
 

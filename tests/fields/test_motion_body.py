@@ -5,7 +5,8 @@ import pytest
 import torch
 import trimesh
 
-from mocoflow_core.fields.motion_body import BodyMotion, BodyMotionConfig, build_body_motion
+from mocoflow_core.fields.body_lattices import BodyMotionConfig, build_body_motion
+from mocoflow_core.fields.motion_body import BodyMotion
 from tests.rigid_figures import (
     MOTIONS,
     REACH_M,
