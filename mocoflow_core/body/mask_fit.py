@@ -24,6 +24,7 @@ from mocoflow_core.body.outline import (
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.threads import torch_threads
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -96,9 +97,12 @@ def fit_to_masks(
     if expected == 0:
         return meshes
     correction = _no_correction(skeleton, meshes, clip, frames, expected, configuration)
-    _optimise(correction, rows, outlines, topology, clip.camera, configuration, progress)
-    with torch.no_grad():
-        return replace(meshes, vertices=correction.vertices(np.arange(len(meshes.vertices))))
+    # Sums over several threads differ in their last bit from run to run.
+    with torch_threads(1):
+        _optimise(correction, rows, outlines, topology, clip.camera, configuration, progress)
+        with torch.no_grad():
+            vertices = correction.vertices(np.arange(len(meshes.vertices)))
+    return replace(meshes, vertices=vertices)
 
 
 def _no_correction(
