@@ -28,7 +28,6 @@ class PlanConfig(ConfigurationPart):
     motion_fields: Force = "auto"
     motion_residual: Force = "auto"
     motion_consensus: Force = "auto"
-    fit_motion_steps: Force = "auto"
     appearance_codes: Force = "auto"
     fixed_light: Force = "auto"
     trusted_overlap: float = Field(
@@ -90,7 +89,6 @@ def plan_scene(
         moves,
         residual,
         _consensus(residual).forced(configuration.motion_consensus),
-        _fit_steps(residual, agreement, configuration),
         _appearance(clip, posed, configuration),
         lit,
     )
@@ -220,19 +218,6 @@ def _consensus(residual: Decision) -> Decision:
         threshold=residual.threshold,
         saves="the chains through the motion of two frames, about half of a step",
     )
-
-
-def _fit_steps(residual: Decision, agreement: MaskAgreement, configuration: PlanConfig) -> Decision:
-    return Decision(
-        name="fit_motion_steps",
-        needed=residual.needed,
-        reason="the motion has a residual to fit before all is optimised"
-        if residual.needed
-        else "the body's motion is the motion already",
-        evidence={"outline_px": agreement.outline_px},
-        threshold=configuration.consistent_px,
-        saves="the steps of the motion stage",
-    ).forced(configuration.fit_motion_steps)
 
 
 def _appearance(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> Decision:

@@ -10,7 +10,6 @@ from mocoflow_core.configuration import ConfigurationPart
 class ScheduleConfig(ConfigurationPart):
     """Steps and rates. A step is one update of the optimiser, on however many devices."""
 
-    fit_steps: int = Field(0, ge=0, description="N1: fit_motion with density frozen")
     coarse_steps: int = Field(500, ge=0, description="N2: joint, bands fading in")
     fine_steps: int = Field(250, ge=0, description="N3: joint, all bands on")
     rays: int = Field(768, ge=1, description="rays of one step")

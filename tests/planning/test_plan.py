@@ -28,7 +28,6 @@ DECISIONS = [
     "motion_fields",
     "motion_residual",
     "motion_consensus",
-    "fit_motion_steps",
     "appearance_codes",
     "fixed_light",
 ]
@@ -73,7 +72,6 @@ def test_meshes_off_the_masks_need_a_residual_and_its_consensus(folder):
     plan = planned(folder, bent)
     assert plan.needs("motion_residual")
     assert plan.needs("motion_consensus")
-    assert plan.needs("fit_motion_steps")
     evidence = plan.decision("motion_residual").evidence
     assert evidence["outline_px"] > plan.decision("motion_residual").threshold
 

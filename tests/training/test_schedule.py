@@ -42,7 +42,7 @@ def test_shortening_the_schedule_keeps_its_shape():
 
 
 def test_the_joint_steps_are_the_coarse_and_the_fine_ones():
-    assert ScheduleConfig(coarse_steps=7, fine_steps=5, fit_steps=100).joint_steps == 12
+    assert ScheduleConfig(coarse_steps=7, fine_steps=5).joint_steps == 12
 
 
 def test_snapshots_are_due_at_geometric_times():
