@@ -21,6 +21,7 @@ from mocoflow_core.artifacts import Artifact
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.store import Store
+from mocoflow_core.threads import torch_threads
 from tasks.progress import Progress, showing_progress
 from tasks.source import Source
 
@@ -94,7 +95,8 @@ class CachedStage(Generic[Inputs, Kind]):
         with store.computing(self.kind, self._key(arguments), resumes=self.resumes) as work:
             if work.found:
                 return work.found
-            with showing_progress(self.kind.stage, work.note_time) as progress:
+            # More than one thread only where a stage has measured that it pays.
+            with torch_threads(1), showing_progress(self.kind.stage, work.note_time) as progress:
                 summary = self.body(Stage(work.path, progress, store), **arguments)  # type: ignore
             return work.commit(self.version, *_by_content(arguments), summary)
 

@@ -20,6 +20,7 @@ from mocoflow_core.io.video import write_video
 from mocoflow_core.methods.presentation import body_centre, orbit
 from mocoflow_core.methods.rendered_views import Progress
 from mocoflow_core.rendering.trained_scene import TrainedScene
+from mocoflow_core.threads import torch_threads
 
 ORBIT = "orbit"
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
@@ -57,20 +58,27 @@ def render_novel_views(
     """
     scene = TrainedScene.open(trained)
     shots = _shots(run, scene, request)
-    pictures = _pictures(scene, shots, _background(request.background, shots[0].camera), progress)
+    background = _background(request.background, shots[0].camera)
+    # More than one thread only where the optimisation has measured that it pays.
+    with torch_threads(1):
+        pictures = _pictures(scene, shots, background, progress)
+        _write(pictures, len(shots), out, request.fps or _clip(run)["fps"])
+    return len(shots)
+
+
+def _write(
+    pictures: Iterator[tuple[Shot, NDArray[np.uint8]]], count: int, out: Path, fps: float
+) -> None:
     if out.suffix.lower() in VIDEO_SUFFIXES:
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_video(out, (picture for _, picture in pictures), request.fps or _clip(run)["fps"])
+        write_video(out, (picture for _, picture in pictures), fps)
     elif out.suffix.lower() == ".png":
-        if len(shots) > 1:
-            raise InputError(
-                "One .png holds one view", f"{len(shots)} views", "Give a folder or an .mp4."
-            )
+        if count > 1:
+            raise InputError("One .png holds one view", f"{count} views", "Give a folder or .mp4.")
         write_picture(out, next(pictures)[1])
     else:
         for shot, picture in pictures:
             write_picture(out / f"{shot.number:06d}.png", picture)
-    return len(shots)
 
 
 def _pictures(
