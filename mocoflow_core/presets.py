@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mocoflow_core.body.location import LocationConfig
-from mocoflow_core.body.mask_fit import MaskFitConfig
+from mocoflow_core.body.repair import RepairConfig
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.fields.body_lattices import BodyMotionConfig
@@ -26,7 +26,7 @@ class Configuration(ConfigurationPart):
 
     capture: CaptureConfig = CaptureConfig()
     location: LocationConfig = LocationConfig()
-    repair: MaskFitConfig = MaskFitConfig()
+    repair: RepairConfig = RepairConfig()
     plan: PlanConfig = PlanConfig()
     density: DensityConfig = DensityConfig()
     motion: MotionConfig = MotionConfig()

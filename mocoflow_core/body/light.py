@@ -12,6 +12,7 @@ from pydantic import Field
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
+from mocoflow_core.body.vertex_normals import vertex_normals
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
 
@@ -64,14 +65,14 @@ def _seen_patches(
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Vertices seen in one frame with the mean normal and linear brightness of their pixels."""
     raster = rasterise(vertices, faces, clip.camera)
-    normals = interpolate(raster, faces, _normals(vertices, faces))
+    normals = interpolate(raster, faces, vertex_normals(vertices, faces))
     sight = interpolate(raster, faces, vertices - clip.camera.centre_world)
     length = np.linalg.norm(normals, axis=-1) * np.linalg.norm(sight, axis=-1)
     facing = -(normals * sight).sum(-1) / np.maximum(length, 1e-12)
     seen = raster.covered & clip.masks[row] & (facing > least_facing)
     corner = raster.barycentric[seen].argmax(-1)
     vertex = faces[raster.face_index[seen], corner]
-    light = _linear(clip.frames[row][seen]) @ _LUMINANCE
+    light = linear_light(clip.frames[row][seen]) @ _LUMINANCE
     found, place = np.unique(vertex, return_inverse=True)
     count = np.bincount(place)
     total = np.zeros((len(found), 3))
@@ -114,18 +115,7 @@ def _without_means(values: Floats, group: NDArray[np.int64], weight: Floats) -> 
     return (flat - means[group]).reshape(values.shape)
 
 
-def _linear(encoded: NDArray[np.uint8]) -> Floats:
-    """sRGB bytes to linear light in [0, 1]."""
+def linear_light(encoded: NDArray[np.uint8]) -> Floats:
+    """sRGB bytes (...) to linear light in [0, 1]."""
     value = encoded / 255.0
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-
-
-def _normals(vertices: Floats, faces: NDArray[np.int32]) -> Floats:
-    """Vertex normals (V, 3), outward whichever way the faces wind; not of unit length."""
-    corners = vertices[faces]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(normals, faces[:, corner], flat)
-    middle = corners.mean(1) - vertices.mean(0)
-    return normals if (flat * middle).sum() >= 0 else -normals

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import rasterise
 from mocoflow_core.body.subdivide import Subdivision, levels_for, subdivide, unique_edges
+from mocoflow_core.body.vertex_normals import vertex_normals
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
@@ -104,12 +105,11 @@ def colour_mesh(
         raise InputError("a train frame with a mask", "none", "Give masks or a background.")
     posed = meshes.at(clip.frame_indices[rows])
     subdivision = _subdivision(posed, clip.camera, configuration)
-    facing = _outward(posed)
     samples = np.full((len(rows), subdivision.weights.shape[0], 3), UNSEEN, np.int16)
     for sample, row, vertices in zip(samples, rows, posed.vertices, strict=True):
         points = subdivision.refine(vertices.astype(np.float64))
-        normals = subdivision.refine(_normals(vertices, facing))
-        sample[:] = _sample(clip, int(row), points, normals, vertices, facing, configuration)
+        normals = subdivision.refine(vertex_normals(vertices, posed.faces))
+        sample[:] = _sample(clip, int(row), points, normals, vertices, posed.faces, configuration)
     colours, seen = _median(samples)
     if not seen.any():
         raise InputError(
@@ -132,22 +132,6 @@ def _subdivision(
     spacing = min(configuration.max_spacing_px * pixel_m, configuration.max_spacing_m)
     levels = levels_for(posed.vertices[0], posed.faces, spacing, configuration.max_vertices)
     return subdivide(posed.faces, posed.vertices.shape[1], levels)
-
-
-def _outward(posed: MeshSequence) -> NDArray[np.int32]:
-    """The faces, wound so that normals point out of the body."""
-    a, b, c = (posed.vertices[0] - posed.vertices[0].mean(axis=0))[posed.faces].transpose(1, 0, 2)
-    volume = float(np.einsum("nk,nk->", a, np.cross(b, c)))
-    return posed.faces if volume >= 0 else posed.faces[:, ::-1]
-
-
-def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Vertex normals (V, 3), weighted by the faces' areas; zero where faces have none."""
-    a, b, c = vertices[faces].astype(np.float64).transpose(1, 0, 2)
-    normals = np.zeros((len(vertices), 3))
-    for corner in faces.T:
-        np.add.at(normals, corner, np.cross(b - a, c - a))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def _sample(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.vertex_normals import vertex_normals
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.geometry.camera import Camera
 
@@ -52,18 +53,10 @@ def _luminance(
     grey = cv2.blur(cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY), (BLUR_PX, BLUR_PX))
     points = camera.to_camera(vertices.astype(np.float64))
     pixels = np.floor(camera.project(vertices.astype(np.float64))).astype(int)
-    facing = -(_normals(points, faces) * points).sum(-1) / np.linalg.norm(points, axis=-1)
+    normals = vertex_normals(points, faces)
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+    facing = -(normals * points).sum(-1) / np.linalg.norm(points, axis=-1)
     inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)
     columns, rows = pixels.clip(0, (camera.width - 1, camera.height - 1)).T
     visible = inside & (points[:, 2] > 0) & (facing > LEAST_FACING) & mask[rows, columns]
     return np.where(visible, grey[rows, columns] / 255.0, np.nan)
-
-
-def _normals(points: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Unit vertex normals (V, 3), outward for the usual winding."""
-    corners = points[faces]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.zeros_like(points)
-    for corner in range(3):
-        np.add.at(normals, faces[:, corner], flat)
-    return normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)

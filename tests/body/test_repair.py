@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from mocoflow_core.body.mask_fit import MaskFitConfig, fit_to_masks
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.repair import RepairConfig, RoundsConfig, repair_body
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.geometry.camera import Camera
 
 FRAMES, SIZE, HINGE = 8, 96, 0.15
 HELD_OUT = np.arange(FRAMES) == 3
-CONFIGURATION = MaskFitConfig(parts=6, rounds=8, steps=10)
+CONFIGURATION = RepairConfig(
+    parts=6,
+    by_masks=RoundsConfig(rounds=8, steps=10, rate=0.15, outlier_m=(0.08, 0.02)),
+    by_both=RoundsConfig(rounds=2, steps=10, rate=0.1, outlier_m=(0.02, 0.02)),
+)
 
 
 def camera() -> Camera:
@@ -51,7 +55,7 @@ def filmed(meshes: MeshSequence) -> Clip:
 
 
 def fitted(clip: Clip, meshes: MeshSequence) -> np.ndarray:
-    return fit_to_masks(clip, meshes, CONFIGURATION, lambda fraction, text: None).vertices
+    return repair_body(clip, meshes, CONFIGURATION, lambda fraction, text: None).vertices
 
 
 @pytest.fixture(scope="module")
