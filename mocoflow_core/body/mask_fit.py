@@ -150,7 +150,8 @@ def _expected_share(
     if not len(distances):
         return 0.0
     apart_px = float(np.percentile(np.abs(distances - np.median(distances)), 75))
-    ramp = configuration.apart_px - configuration.agreeing_px
+    # Where both thresholds are the same, or crossed, the ramp is a step.
+    ramp = max(configuration.apart_px - configuration.agreeing_px, 1e-9)
     return float(np.clip((apart_px - configuration.agreeing_px) / ramp, 0.0, 1.0))
 
 

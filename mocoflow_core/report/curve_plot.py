@@ -118,10 +118,10 @@ def _panel(axes: Axes, rows: Sequence[CurveRow], metric: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(length=3, which="both")
     axes.margins(y=0.14)
-    _plain_ticks(axes)
+    plain_ticks(axes)
 
 
-def _plain_ticks(axes: Axes) -> None:
+def plain_ticks(axes: Axes) -> None:
     """Numbers as people write them, at 1, 2, 5 of each decade, or closer on a short axis."""
     low, high = axes.get_ylim()
     subdivisions = (1, 2, 5) if high / low > 4 else (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)
