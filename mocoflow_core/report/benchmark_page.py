@@ -80,10 +80,10 @@ def _context(results: BenchmarkResults, command: str) -> dict[str, Any]:
     figure = plot_benchmark(results.curves)
     metrics = [metric for metric in METRICS if any(metric in s for s in summaries.values())]
     finished = [cell for cell in cells if cell.state == "finished"]
-    named = {contender.method for contender in results.scores}
+    named = {contender.method for contender in results.scores} | {cell.method for cell in cells}
     return {
         "command": command,
-        "facts": _facts(cells, finished),
+        "facts": _facts(cells, finished, len(named)),
         "finished": len(finished),
         "several_presets": len({cell.preset for cell in cells}) > 1,
         "chart": None if figure is None else Markup(svg_of(figure)),
@@ -99,12 +99,12 @@ def _context(results: BenchmarkResults, command: str) -> dict[str, Any]:
     }
 
 
-def _facts(cells: Sequence[CellRecord], finished: Sequence[CellRecord]) -> list[str]:
+def _facts(cells: Sequence[CellRecord], finished: Sequence[CellRecord], methods: int) -> list[str]:
     """What stands below the title."""
     counts = (
         (len({cell.scene for cell in cells}), "scene"),
         (len({cell.preset for cell in cells}), "preset"),
-        (len({cell.method for cell in cells}), "method"),
+        (methods, "method"),
         (len({cell.seed for cell in cells}), "seed"),
     )
     facts = [f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts]
@@ -126,14 +126,10 @@ def _summary_rows(summaries: Summaries, metrics: Sequence[str]) -> list[TableRow
                 continue
             means = [rival[metric].mean for rival in rivals if metric in rival]
             best = max(means) if label.higher_is_better else min(means)
-            spread = f"{label.text(summary.low)} to {label.text(summary.high)}"
-            cells.append(
-                SummaryCell(
-                    label.text(summary.mean),
-                    spread if summary.seeds > 1 else "",
-                    len(means) > 1 and summary.mean == best,
-                )
-            )
+            low, high = label.text(summary.low), label.text(summary.high)
+            spread = f"{low} to {high}" if low != high else ""
+            is_best = len(means) > 1 and summary.mean == best
+            cells.append(SummaryCell(label.text(summary.mean), spread, is_best))
         seeds = max((summary.seeds for summary in found.values()), default=0)
         rows.append(TableRow(contender, seeds, cells))
     return rows

@@ -25,12 +25,23 @@ def omissions(
 ) -> list[Omission]:
     """Failed cells first, then refused steps, ablations without effect, targets out of reach."""
     cells = list(cells)
-    found = [Omission(c.name, f"{c.state}: {c.reason}") for c in cells if c.state != "finished"]
+    found = _unfinished(cells)
     found += [Omission(c.name, f"guard: {event}") for c in cells for event in c.guard_events]
-    found += [
-        Omission(" ".join(_words(c)), _same(c)) for c in scores if _changed_nothing(c, scores)
-    ]
+    found += [Omission("/".join(c), _same(c)) for c in scores if _changed_nothing(c, scores)]
     return found + _never_reached(times)
+
+
+def _unfinished(cells: Iterable[CellRecord]) -> list[Omission]:
+    """Seeds of one contender that ended in the same way are said once."""
+    ended: dict[tuple[str, str], list[str]] = {}
+    for cell in cells:
+        if cell.state != "finished":
+            contender = f"{cell.scene}/{cell.preset}/{cell.method}"
+            ended.setdefault((contender, f"{cell.state}: {cell.reason}"), []).append(str(cell.seed))
+    return [
+        Omission(f"{contender}, seed {', '.join(seeds)}", why)
+        for (contender, why), seeds in ended.items()
+    ]
 
 
 def _changed_nothing(contender: Contender, scores: Runs[ScoreRow]) -> bool:
@@ -69,7 +80,3 @@ def _never_reached(times: Sequence[TimeToTarget]) -> list[Omission]:
         )
         for (scene, metric), values in missed.items()
     ]
-
-
-def _words(contender: Contender) -> tuple[str, ...]:
-    return (contender.scene, contender.preset, contender.method.replace("_", " "))
