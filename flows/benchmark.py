@@ -105,7 +105,12 @@ def run_cell(cell: Cell) -> CellRecord:
 def _reason(state: State[RunRecord]) -> str:
     """Why it ended, on one line; bad input speaks for itself, other errors say what they are."""
     error = state.result(raise_on_failure=False)
-    reason = str(error) if isinstance(error, InputError) else state.message or str(state.name)
+    if isinstance(error, InputError):
+        reason = str(error)
+    elif isinstance(error, BaseException):
+        reason = f"{type(error).__name__}: {error}"
+    else:
+        reason = state.message or str(state.name)
     return " ".join(reason.split())
 
 

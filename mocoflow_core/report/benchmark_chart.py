@@ -16,9 +16,8 @@ from mocoflow_core.metrics.curve import CurveRow
 from mocoflow_core.metrics.seed_band import last_points, seed_band
 from mocoflow_core.report.curve_plot import ACCENT, SVG_SETTINGS, WARM, plain_ticks
 from mocoflow_core.report.inputs import BASELINE
-from mocoflow_core.report.metric_labels import label_of
 
-METRIC = "psnr_union"
+METRIC = "psnr_union"  # Its error is the mean squared one over the person.
 COLUMNS = 3
 LEVEL = (0, (5, 3))
 # Told apart by people who see red and green alike; the first is the page's own accent.
@@ -26,7 +25,7 @@ COLOURS = (ACCENT, "#5b4fc4", "#c0392b", "#2f7fbf", "#8a6d00", "#b0408a", "#5f6b
 STYLES = ("-", "--", ":", "-.")
 
 
-def plot_benchmark(runs: Runs[CurveRow], metric: str = METRIC) -> Figure | None:
+def plot_benchmark(runs: Runs[CurveRow]) -> Figure | None:
     """Log seconds of the training clock against log error; None where there is nothing to draw.
 
     A line is the median over seeds, its band their range, a dot where one seed ended. The posed
@@ -43,7 +42,7 @@ def plot_benchmark(runs: Runs[CurveRow], metric: str = METRIC) -> Figure | None:
         figure.patch.set_alpha(0.0)
         places = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes, scene in zip(places, scenes, strict=False):
-            _panel(axes, {c: seeds for c, seeds in runs.items() if c.scene == scene}, runs, metric)
+            _panel(axes, {c: seeds for c, seeds in runs.items() if c.scene == scene}, runs)
         for axes in places[len(scenes) :]:
             axes.set_axis_off()
         figure.legend(
@@ -59,24 +58,24 @@ def write_benchmark_chart(runs: Runs[CurveRow], path: Path) -> None:
         figure.savefig(path, dpi=110, facecolor="white")
 
 
-def _panel(axes: Axes, shown: Runs[CurveRow], runs: Runs[CurveRow], metric: str) -> None:
+def _panel(axes: Axes, shown: Runs[CurveRow], runs: Runs[CurveRow]) -> None:
     axes.patch.set_alpha(0.0)
     axes.set_xscale("log")
     axes.set_yscale("log")
     for contender, seeds in shown.items():
         colour, style = _look(contender, runs)
-        ends = last_points(seeds.values(), metric)
+        ends = last_points(seeds.values(), METRIC)
         if contender.method == BASELINE:
             _level(axes, ends)
             continue
         axes.plot(ends[:, 0], ends[:, 1], "o", color=colour, ms=3.5, zorder=4)
-        band = seed_band(seeds.values(), metric)
+        band = seed_band(seeds.values(), METRIC)
         if band is not None:
             axes.plot(band.seconds, band.median, style, color=colour, lw=1.8, zorder=3)
             if len(seeds) > 1:
                 axes.fill_between(band.seconds, band.low, band.high, color=colour, alpha=0.2, lw=0)
     axes.set_title(next(iter(shown)).scene, loc="left", fontsize=10.5, pad=8)
-    axes.set_ylabel(f"mean squared error ({label_of(metric).title})")
+    axes.set_ylabel("mean squared error over the person")
     axes.set_xlabel("seconds of the training clock")
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(length=3, which="both")
