@@ -60,10 +60,14 @@ def test_every_cell_is_run_and_one_that_fails_stops_no_other(first):
     assert any("broken/toy/mocoflow, seed 0, 1" == row["what"] for row in record.omissions)
 
 
-def test_each_cell_is_a_flow_run_that_carries_its_name(first):
+def test_prefect_shows_each_cell_by_its_name_and_the_comparison(first):
     _, record = first
     with get_client(sync_client=True) as client:
         runs = {run.name: run for run in client.read_flow_runs()}
+        shown = {artifact.key: artifact for artifact in client.read_artifacts()}
+    assert "data:image/png" in shown["benchmark"].data
+    assert "broken/toy/mocoflow" in shown["benchmark"].data
+    assert "posed_mesh" in shown["benchmark-scores"].data
     for cell in record.cells:
         assert runs[cell.name].parent_task_run_id
         assert runs[cell.name].state.is_completed() == (cell.state == "finished")
