@@ -107,6 +107,7 @@ class BenchmarkRequest(BaseModel):
 
     def _cell(self, name: str, path: Path, preset: str, method: str, seed: int) -> Cell:
         folder = f"cells/{name}/{preset}/{method}/{seed}"
+        # Failed until it is known to have finished.
         record = CellRecord(
             scene=name, preset=preset, method=method, seed=seed, folder=folder, state="failed"
         )
