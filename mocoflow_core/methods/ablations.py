@@ -32,7 +32,7 @@ ABLATIONS: dict[str, Ablation] = {
         "losses.smoothness_weight", 0.0, "the smoothness of that correction in time"
     ),
     "without_repair": Ablation(
-        "repair.agreeing_px", 1e9, "bending the given mesh towards the masks before training"
+        "repair.agreeing_px", 1e6, "bending the given mesh towards the masks before training"
     ),
     "without_silhouette": Ablation("losses.silhouette_weight", 0.0, "opacity held to the masks"),
     "without_offset": Ablation("losses.offset_weight", 0.0, "density held to the mesh's surface"),

@@ -24,7 +24,8 @@ SCHEMA = pa.schema(
         ("target", pa.float64()),
         ("seeds", pa.int64()),
         ("reached", pa.int64()),
-        ("median_s", pa.float64()),
+        ("median_wall_s", pa.float64()),
+        ("median_cpu_s", pa.float64()),
     ]
 )
 
@@ -37,7 +38,7 @@ class Target(NamedTuple):
 
 
 class TimeToTarget(NamedTuple):
-    """One row of ``time_to_target.parquet``; wall seconds of the training clock."""
+    """One row of ``time_to_target.parquet``; seconds of the training clock."""
 
     scene: str
     preset: str
@@ -46,7 +47,8 @@ class TimeToTarget(NamedTuple):
     target: float
     seeds: int
     reached: int  # by so many of them
-    median_s: float | None  # none where the median seed did not reach it
+    median_wall_s: float | None  # none where the median seed did not reach it
+    median_cpu_s: float | None
 
 
 class TargetConfig(ConfigurationPart):
@@ -80,20 +82,20 @@ def times_to_targets(runs: Runs[CurveRow], targets: Sequence[Target]) -> list[Ti
         scored = {row.metric for rows in seeds.values() for row in rows}
         for target in targets:
             if target.metric in scored:
-                times = [seconds_to_target(rows, *target) for rows in seeds.values()]
-                reached = [time for time in times if time is not None]
-                late = [np.inf] * (len(times) - len(reached))
-                median = float(np.median(reached + late))
-                found.append(
-                    TimeToTarget(
-                        *contender,
-                        *target,
-                        len(times),
-                        len(reached),
-                        median if np.isfinite(median) else None,
-                    )
+                wall, cpu = (
+                    [seconds_to_target(rows, *target, clock) for rows in seeds.values()]
+                    for clock in ("wall_s", "cpu_s")
                 )
+                reached = len(wall) - wall.count(None)
+                medians = (_median(wall), _median(cpu))
+                found.append(TimeToTarget(*contender, *target, len(wall), reached, *medians))
     return found
+
+
+def _median(seconds: Sequence[float | None]) -> float | None:
+    """Of which None is later than any number."""
+    median = float(np.median([np.inf if second is None else second for second in seconds]))
+    return median if np.isfinite(median) else None
 
 
 def write_times(rows: Sequence[TimeToTarget], path: Path) -> None:

@@ -137,5 +137,5 @@ def test_masks_away_from_the_body_give_finite_meshes(
 def test_an_estimate_that_counts_as_agreeing_is_left_as_it_came(
     truth: MeshSequence, bent: MeshSequence
 ) -> None:
-    trusting = CONFIGURATION.model_copy(update={"agreeing_px": 1e9})
+    trusting = CONFIGURATION.model_copy(update={"agreeing_px": 1e6})
     assert fit_to_masks(filmed(truth), bent, trusting, lambda fraction, text: None) is bent

@@ -31,7 +31,7 @@ def scores(method: str, *values: float) -> dict[int, list[ScoreRow]]:
 
 def test_a_benchmark_that_lacks_nothing_omits_nothing():
     runs = {WHOLE: scores("mocoflow", 20.0), PART: scores("without_consensus", 19.0)}
-    reached = TimeToTarget(*WHOLE, "psnr", 18.0, 3, 1, None)
+    reached = TimeToTarget(*WHOLE, "psnr", 18.0, 3, 1, None, None)
     assert omissions([cell()], runs, [reached]) == []
 
 
@@ -65,10 +65,10 @@ def test_the_last_digit_of_one_seed_is_a_difference():
 
 def test_a_target_that_nobody_reached_is_said_and_one_that_somebody_did_is_not():
     times = [
-        TimeToTarget(*WHOLE, "psnr", 20.0, 3, 1, None),
-        TimeToTarget(*PART, "psnr", 20.0, 3, 0, None),
-        TimeToTarget(*WHOLE, "psnr", 30.0, 3, 0, None),
-        TimeToTarget(*PART, "psnr", 30.0, 3, 0, None),
+        TimeToTarget(*WHOLE, "psnr", 20.0, 3, 1, None, None),
+        TimeToTarget(*PART, "psnr", 20.0, 3, 0, None, None),
+        TimeToTarget(*WHOLE, "psnr", 30.0, 3, 0, None, None),
+        TimeToTarget(*PART, "psnr", 30.0, 3, 0, None, None),
     ]
     [found] = omissions([], {}, times)
     assert found.why == "no seed of any method reached 30 dB"
