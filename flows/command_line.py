@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
 
@@ -79,6 +80,71 @@ def reconstruct(
     typer.echo(f"Report: {request.out / 'report.html'}")
 
 
+@app.command(cls=ListOptions)
+def benchmark(
+    scenes: Annotated[
+        list[str], typer.Option(metavar="SCENE...", help="Folders, or synthetic scenes by name.")
+    ],
+    out: Annotated[Path, typer.Option(help="New folder for the results.")],
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(metavar="METHOD...", help="mocoflow, posed_mesh, without_consensus, ..."),
+    ] = None,
+    presets: Annotated[
+        list[str] | None, typer.Option(metavar="PRESET...", help="fast or toy.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(help="How many seeds, from 0.", min=1)] = 3,
+    budget: Annotated[
+        float | None, typer.Option(help="Seconds of the training clock of each run.", min=1.0)
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE...", help="Fields of the configuration."),
+    ] = None,
+    targets: Annotated[
+        list[str] | None,
+        typer.Option(metavar="METRIC=VALUE...", help="Scores to be reached, as psnr_union=20."),
+    ] = None,
+    store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+) -> None:
+    """Compare methods and presets on several scenes: error against run time."""
+    from flows.benchmark_request import BenchmarkRequest
+
+    request = BenchmarkRequest(
+        scenes=tuple(scenes),
+        out=out,
+        methods=tuple(methods or ("mocoflow", "posed_mesh")),
+        presets=tuple(presets or ("fast",)),
+        seeds=seeds,
+        budget_s=budget,
+        settings=tuple(settings or ()),
+        targets=tuple(targets or ()),
+        store_url=store,
+    )
+    request.claim()
+    set_environment()
+    from flows.benchmark import benchmark as flow
+
+    with undisturbed():
+        record = flow(
+            scenes=request.scenes,
+            out=request.out,
+            methods=request.methods,
+            presets=request.presets,
+            seeds=request.seeds,
+            budget_s=request.budget_s,
+            settings=request.settings,
+            targets=request.targets,
+            store=request.store_url,
+        )
+    for cell in record.cells:
+        if cell.state != "finished":
+            typer.echo(f"{cell.name} {cell.state}: {cell.reason}", err=True)
+    typer.echo(f"Benchmark: {request.out / 'benchmark.html'}")
+    if not any(cell.state == "finished" for cell in record.cells):
+        sys.exit(1)
+
+
 @app.command()
 def render(
     run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
@@ -130,14 +196,19 @@ def render(
 def synth(
     name: Annotated[str, typer.Argument(help="turn, walk, dance, spin or still; see the README.")],
     out: Annotated[Path, typer.Option(help="New folder for the scene.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE", help="One field of the scene."),
+    ] = None,
 ) -> None:
     """Make a synthetic scene with exact truth."""
     from mocoflow_core.synthetic.catalogue import named_scene
     from mocoflow_core.synthetic.scene_writer import write_scene
     from tasks.terminal_bar import terminal_bar
 
-    with terminal_bar(f"synth {name}") as progress:
-        write_scene(named_scene(name), out, progress)
+    configuration = named_scene(",".join((name, *(settings or ()))))
+    with terminal_bar(f"synth {configuration.name}") as progress:
+        write_scene(configuration, out, progress)
     typer.echo(f"Scene: {out}")
 
 

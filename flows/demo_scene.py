@@ -1,4 +1,4 @@
-"""The embedded scene: generated at first use, kept in the user's cache."""
+"""Synthetic scenes by name: generated at first use, kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from tasks.terminal_bar import terminal_bar
 
 
 def demo_scene(name: str) -> Path:
-    """The folder of a named synthetic scene; it appears complete or not at all."""
+    """The folder of a synthetic scene, named as in ``named_scene``.
+
+    It appears complete or not at all.
+    """
     configuration = named_scene(name)
     digest = digest_document(configuration.model_dump(mode="json"))
-    folder = cache_folder() / "scenes" / f"{name}-{digest[:12]}"
+    folder = cache_folder() / "scenes" / f"{configuration.name}-{digest[:12]}"
     if not folder.is_dir():
         folder.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(mkdtemp(prefix=f"{name}-", dir=folder.parent))
-        with terminal_bar(f"synth {name}") as progress:
+        beside = Path(mkdtemp(prefix=f"{configuration.name}-", dir=folder.parent))
+        with terminal_bar(f"synth {configuration.name}") as progress:
             write_scene(configuration, beside, progress)
         beside.rename(folder)
     return folder

@@ -18,6 +18,7 @@ from mocoflow_core.artifacts import (
 )
 from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunRecord, StageRecord
+from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
 
 # What rendering the run again needs to know of its clip.
 CAPTURE = ("fps", "source_fps", "first_frame", "last_frame", "up")
@@ -44,6 +45,7 @@ def describe_run(
         "stages": records(stages),
         "scores": scores.summary["mean"],
         "warnings": tuple(dict.fromkeys(w for stage in stages for w in stage.warnings)),
+        "guard_events": tuple(str(event) for event in trained.summary["events"]),
     }
 
 
@@ -70,13 +72,27 @@ def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
         for camera, metrics in cameras.items()
     ]
     create_table_artifact(rows, key="scores", description=f"Mean scores of {record.scene}")
-    lines = [f"# {record.scene}", "", f"`{report}`", ""]
-    if picture.exists():
-        content = base64.b64encode(picture.read_bytes()).decode()
-        lines += [f"![error against time](data:image/png;base64,{content})", ""]
+    lines = [f"# {record.scene}", "", f"`{report}`", "", *_embedded(picture)]
     lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [
         f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'from the store' if s.cached else ''} |"
         for s in record.stages
     ]
     create_markdown_artifact("\n".join(lines), key="report", description=f"Run on {record.scene}")
+
+
+def show_benchmark_in_prefect(record: BenchmarkRecord, page: Path, chart: Path) -> None:
+    """On the benchmark's page: the scores, the chart, what is missing and where the page lies."""
+    create_table_artifact(list(record.summary), key="benchmark-scores", description=record.command)
+    lines = ["# Error against run time", "", f"`{page}`", "", *_embedded(chart)]
+    lines += [f"`{record.command}`", "", "| omission | why |", "|-|-|"]
+    lines += [f"| {omission['what']} | {omission['why']} |" for omission in record.omissions]
+    create_markdown_artifact("\n".join(lines), key="benchmark", description=record.command)
+
+
+def _embedded(picture: Path) -> list[str]:
+    """Markdown lines that hold the picture itself; none where there is none."""
+    if not picture.exists():
+        return []
+    content = base64.b64encode(picture.read_bytes()).decode()
+    return [f"![error against time](data:image/png;base64,{content})", ""]

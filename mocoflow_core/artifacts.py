@@ -93,3 +93,15 @@ class ScoresArtifact(Artifact):
 
 class ReportArtifact(Artifact):
     stage = "write_report"
+
+
+class CellTablesArtifact(Artifact):
+    """The tables of all cells of a benchmark."""
+
+    stage = "collect_cells"
+
+
+class BenchmarkArtifact(Artifact):
+    """Chart and page of a benchmark."""
+
+    stage = "write_benchmark"

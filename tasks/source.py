@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
 from mocoflow_core.capture.scene import Scene
-from mocoflow_core.io.content_key import digest_document, digest_file
+from mocoflow_core.io.content_key import digest_document, digest_file, digest_files
 
 
 class Source(BaseModel):
@@ -37,6 +38,11 @@ def meshes_source(scene: Scene, given: Path | None) -> Source | None:
 def evaluation_source(scene: Scene) -> Source:
     """What the other cameras recorded, and the truth. Only metrics may depend on it."""
     return _source(scene, scene.evaluation_description(), scene.evaluation_files())
+
+
+def folder_source(folder: Path, names: Iterable[str]) -> Source:
+    """The named files of a folder."""
+    return Source(path=folder, digest=digest_files({name: folder / name for name in names}))
 
 
 def _source(scene: Scene, description: dict[str, object], files: list[Path]) -> Source:

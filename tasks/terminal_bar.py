@@ -28,3 +28,10 @@ def terminal_bar(title: str) -> Iterator[Progress]:
         row = bar.add_task(title, total=1.0, text="")
         yield lambda fraction, text: bar.update(row, completed=fraction, text=text)
         bar.update(row, completed=1.0, text="")
+
+
+def terminal_line(text: str) -> None:
+    """A line above the bars, in a terminal and nowhere else."""
+    console = Console(stderr=True)
+    if console.is_terminal:
+        console.print(text, highlight=False, markup=False)

@@ -92,8 +92,10 @@ class MaskMisfit:
         if not len(distances):
             return 0.0
         apart_px = float(np.percentile(np.abs(distances - np.median(distances)), 75))
-        ramp = self._configuration.apart_px - self._configuration.agreeing_px
-        return float(np.clip((apart_px - self._configuration.agreeing_px) / ramp, 0.0, 1.0))
+        agreeing_px = self._configuration.agreeing_px
+        # Where both thresholds are the same, or crossed, the ramp is a step.
+        ramp = max(self._configuration.apart_px - agreeing_px, 1e-9)
+        return float(np.clip((apart_px - agreeing_px) / ramp, 0.0, 1.0))
 
     def look(self, correction: JointCorrection) -> _Targets:
         """The points that belong together as the body stands now."""

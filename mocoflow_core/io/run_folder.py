@@ -55,6 +55,7 @@ class RunRecord(BaseModel):
     cameras: dict[str, JsonValue] = {}
     scores: dict[str, JsonValue] = {}
     warnings: tuple[str, ...] = ()
+    guard_events: tuple[str, ...] = ()
     outputs: dict[str, int] = {}
 
     def stage(self, name: str) -> StageRecord:

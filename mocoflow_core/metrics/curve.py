@@ -72,8 +72,9 @@ def write_curve(rows: Sequence[CurveRow], path: Path) -> None:
 
 
 def read_curve(path: Path) -> list[CurveRow]:
-    """The rows of a table written by ``write_curve``."""
-    return [CurveRow(**record) for record in parquet.read_table(path).to_pylist()]
+    """The rows of a table written by ``write_curve``; a benchmark's further column is left out."""
+    records = parquet.read_table(path, columns=SCHEMA.names).to_pylist()
+    return [CurveRow(**record) for record in records]
 
 
 def as_error(metric: str, value: float) -> float:
@@ -83,14 +84,18 @@ def as_error(metric: str, value: float) -> float:
     return 1.0 - value if metric in SIMILARITIES else value
 
 
-def seconds_to_target(rows: Iterable[CurveRow], metric: str, target: float) -> float | None:
-    """First wall second at which one run's ``metric`` is at least as good as ``target``.
+def seconds_to_target(
+    rows: Iterable[CurveRow], metric: str, target: float, clock: str = "wall_s"
+) -> float | None:
+    """First second at which one run's ``metric`` is at least as good as ``target``.
 
-    None when it was never reached.
+    None when it was never reached. ``clock`` is ``wall_s`` or ``cpu_s``.
     """
     bound = as_error(metric, target)
     reached = [
-        row.wall_s for row in rows if row.metric == metric and as_error(metric, row.value) <= bound
+        float(getattr(row, clock))
+        for row in rows
+        if row.metric == metric and as_error(metric, row.value) <= bound
     ]
     return min(reached, default=None)
 

@@ -44,8 +44,9 @@ def write_scores(rows: Sequence[ScoreRow], path: Path) -> None:
 
 
 def read_scores(path: Path) -> list[ScoreRow]:
-    """The rows of a table written by ``write_scores``."""
-    return [ScoreRow(**record) for record in parquet.read_table(path).to_pylist()]
+    """The rows of a table written by ``write_scores``; a benchmark's further column is left out."""
+    records = parquet.read_table(path, columns=SCHEMA.names).to_pylist()
+    return [ScoreRow(**record) for record in records]
 
 
 def mean_scores(rows: Iterable[ScoreRow]) -> dict[str, dict[str, dict[str, float]]]:

@@ -69,6 +69,7 @@ def plot_curve(
             _panel(axes, [row for row in rows if row.metric == metric], metric)
             _level(axes, metric, (baseline or {}).get(metric))
             _shade(axes, spans, min(row.wall_s for row in rows), max(row.cpu_s for row in rows))
+            plain_ticks(axes)
         figure.legend(
             handles=_legend(spans, bool(baseline)),
             loc="outside lower center",
@@ -118,15 +119,13 @@ def _panel(axes: Axes, rows: Sequence[CurveRow], metric: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(length=3, which="both")
     axes.margins(y=0.14)
-    _plain_ticks(axes)
 
 
-def _plain_ticks(axes: Axes) -> None:
+def plain_ticks(axes: Axes) -> None:
     """Numbers as people write them, at 1, 2, 5 of each decade, or closer on a short axis."""
-    low, high = axes.get_ylim()
-    subdivisions = (1, 2, 5) if high / low > 4 else (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)
-    for axis, steps in ((axes.xaxis, (1, 2, 5)), (axes.yaxis, subdivisions)):
-        axis.set_major_locator(LogLocator(subs=steps))
+    for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        close = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8) if high / low <= 4 else (1, 2, 3, 5, 7)
+        axis.set_major_locator(LogLocator(subs=close if high / low <= 10 else (1, 2, 5)))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
 

@@ -106,24 +106,35 @@ def _change(old: float, new: float, label: MetricLabel) -> str:
 
 def headlines(rows: Sequence[ScoreRow], method: str, train_camera: str) -> list[Headline]:
     """The key numbers over held-out cameras, or over the train camera's held-out frames."""
-    novel = [row for row in rows if row.camera != train_camera]
-    seen = [row for row in rows if row.metric not in BODY_METRICS]
-    judged = novel if any(row.method == method for row in novel) else seen
+    ours = key_numbers(rows, method, train_camera)
+    theirs = key_numbers(rows, BASELINE, train_camera)
     found = []
     for metric in HEADLINES:
-        source = rows if metric in BODY_METRICS else judged
-        ours, theirs = _values(source, method, metric), _values(source, BASELINE, metric)
-        if not ours:
+        if metric not in ours:
             continue
-        average = np.nanmedian if metric in BODY_METRICS else np.mean
-        label, value = label_of(metric), float(average(ours))
-        note = ""
-        if theirs:
-            before = float(average(theirs))
+        label, note = label_of(metric), ""
+        if metric in theirs:
             name = "before" if metric in BODY_METRICS else "posed mesh"
-            note = f"{name} {label.text(before)}"
-        found.append(Headline(label.title, label.text(value), label.unit, note))
+            note = f"{name} {label.text(theirs[metric])}"
+        found.append(Headline(label.title, label.text(ours[metric]), label.unit, note))
     return found
+
+
+def key_numbers(rows: Sequence[ScoreRow], method: str, train_camera: str) -> dict[str, float]:
+    """One number for each metric of a method in a run.
+
+    Pictures: the mean over held-out cameras or, where there are none, over the train camera's
+    held-out frames. Motion and shape: the median over frames.
+    """
+    pictures = [row for row in rows if row.metric not in BODY_METRICS]
+    novel = [row for row in pictures if row.camera != train_camera]
+    body = [row for row in rows if row.metric in BODY_METRICS]
+    judged = [*(novel or pictures), *body]
+    return {
+        metric: float((np.nanmedian if metric in BODY_METRICS else np.mean)(values))
+        for metric in dict.fromkeys(row.metric for row in judged)
+        if (values := _values(judged, method, metric))
+    }
 
 
 def _camera_rows(title: str, rows: list[ScoreRow], metrics: list[str]) -> list[CameraRow]:

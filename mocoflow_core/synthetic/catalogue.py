@@ -1,8 +1,9 @@
-"""The synthetic scenes that have names: a motion, or a motion with one difficulty."""
+"""The synthetic scenes that have names: a motion, alone or with a difficulty, and its settings."""
 
 from __future__ import annotations
 
 from mocoflow_core.errors import InputError
+from mocoflow_core.settings import with_settings
 from mocoflow_core.synthetic.configuration import SyntheticConfig
 
 _MOTIONS: dict[str, dict[str, object]] = {
@@ -40,12 +41,17 @@ SCENES: dict[str, SyntheticConfig] = {
 
 
 def named_scene(name: str) -> SyntheticConfig:
-    """The configuration of a named scene. Raises InputError for an unknown name."""
-    if name not in SCENES:
+    """The configuration of a named scene, also with settings: ``turn_noise6,joint_noise_deg=3``.
+
+    The scene is called as it is written, unless a setting names it. Raises InputError for an
+    unknown name, field or value.
+    """
+    known, *settings = name.split(",")
+    if known not in SCENES:
         raise InputError(
             "A synthetic scene has a known name",
-            repr(name),
+            repr(known),
             f"Choose a motion ({', '.join(_MOTIONS)}), alone or with one of "
             f"{', '.join(filter(None, _DIFFICULTIES))}.",
         )
-    return SCENES[name]
+    return with_settings(SCENES[known].model_copy(update={"name": name}), settings)

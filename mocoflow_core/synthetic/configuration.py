@@ -16,7 +16,7 @@ MeshEstimate = Literal["exact", "other_topology", "joint_noise", "other_shape"]
 class RecordingConfig(ConfigurationPart):
     """How a performance is recorded. The same values give the same bytes."""
 
-    name: str = Field("turn", min_length=1, description="Name of the scene.")
+    name: str = Field("turn", pattern=r"^[^/]+$", description="Name of the scene.")
     frames: int = Field(48, ge=1, description="Number of frames, spread over the whole motion.")
     fps: float = Field(12.0, gt=0, description="Frames per second that scene.json states.")
     width: int = Field(128, ge=8, description="Pixels of every camera.")

@@ -50,7 +50,7 @@ _ATTRIBUTION = "Rendered from five capsules."
 class ToyConfig(RecordingConfig):
     """A recording small enough for tests."""
 
-    name: str = Field("toy", min_length=1, description="Name of the scene.")
+    name: str = Field("toy", pattern=r"^[^/]+$", description="Name of the scene.")
     frames: int = Field(8, ge=1, description="Number of frames.")
     width: int = Field(32, ge=8, description="Pixels of every camera.")
     height: int = Field(32, ge=8, description="Pixels of every camera.")

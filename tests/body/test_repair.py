@@ -136,3 +136,11 @@ def test_masks_away_from_the_body_give_finite_meshes(
     elsewhere = np.zeros_like(clip.masks)
     elsewhere[:, :3, :3] = True
     assert np.isfinite(fitted(replace(clip, masks=elsewhere), bent)).all()
+
+
+def test_an_estimate_that_counts_as_agreeing_is_left_as_it_came(
+    truth: MeshSequence, bent: MeshSequence
+) -> None:
+    masks = CONFIGURATION.masks.model_copy(update={"agreeing_px": 1e6})
+    trusting = CONFIGURATION.model_copy(update={"masks": masks})
+    assert repair_body(filmed(truth), bent, trusting, lambda fraction, text: None) is bent

@@ -117,6 +117,26 @@ def test_scenes_have_names_and_an_unknown_name_is_refused():
         named_scene("swim")
 
 
+def test_a_scene_with_settings_is_called_as_it_is_written():
+    scene = named_scene("turn_noise6,joint_noise_deg=3,seed=1")
+    changes = {"name": "turn_noise6,joint_noise_deg=3,seed=1", "joint_noise_deg": 3.0, "seed": 1}
+    assert scene == named_scene("turn_noise6").model_copy(update=changes)
+    assert named_scene("turn,name=mine,frames=12").name == "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "because"),
+    [
+        ("turn,joint_noise=3", "joint_noise_deg"),
+        ("turn,frames=0", "frames must be valid"),
+        ("turn,name=a/b", "name must be valid"),
+    ],
+)
+def test_a_setting_that_no_scene_has_is_refused(name, because):
+    with pytest.raises(InputError, match=because):
+        named_scene(name)
+
+
 def test_an_unknown_field_is_refused():
     with pytest.raises(ValidationError):
         SyntheticConfig(colour="red")

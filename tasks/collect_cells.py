@@ -1,0 +1,37 @@
+"""Stage collect_cells: the tables of many runs in one, and what they take to reach a target."""
+
+from __future__ import annotations
+
+from pydantic import JsonValue
+
+from mocoflow_core.artifacts import CellTablesArtifact
+from mocoflow_core.methods.benchmark_folder import finished_cells
+from mocoflow_core.metrics import curve, table
+from mocoflow_core.metrics.benchmark_tables import gather, write_runs
+from mocoflow_core.metrics.time_to_target import TargetConfig, times_to_targets, write_times
+from tasks.source import Source
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(CellTablesArtifact, ALGORITHM_VERSION)
+def collect_cells(
+    work: Stage,
+    folder: Source,
+    cells: list[dict[str, JsonValue]],
+    methods: list[str],
+    targets: TargetConfig,
+) -> Summary:
+    """Scores and error curves of the cells that finished.
+
+    Output: ``scores.parquet``, ``error_curve.parquet``, ``time_to_target.parquet``. Seconds.
+    """
+    finished = finished_cells(cells, folder.path)
+    scores = gather(finished, methods, table.read_scores, "scores.parquet")
+    curves = gather(finished, methods, curve.read_curve, "error_curve.parquet")
+    write_runs(scores, table.SCHEMA, work.folder / "scores.parquet")
+    write_runs(curves, curve.SCHEMA, work.folder / "error_curve.parquet")
+    times = times_to_targets(curves, targets.targets)
+    write_times(times, work.folder / "time_to_target.parquet")
+    return {"contenders": len(scores)}

@@ -1,0 +1,43 @@
+"""Stage write_benchmark: chart and page of a benchmark."""
+
+from __future__ import annotations
+
+from pydantic import JsonValue
+
+from mocoflow_core.artifacts import BenchmarkArtifact, CellTablesArtifact
+from mocoflow_core.methods.benchmark_folder import CellRecord
+from mocoflow_core.metrics.benchmark_tables import read_runs
+from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.table import ScoreRow
+from mocoflow_core.metrics.time_to_target import read_times
+from mocoflow_core.report.benchmark_chart import write_benchmark_chart
+from mocoflow_core.report.benchmark_page import BenchmarkResults, write_benchmark_page
+from tasks.stage import Stage, Summary, stage
+
+ALGORITHM_VERSION = 1  # First version.
+
+
+@stage(BenchmarkArtifact, ALGORITHM_VERSION)
+def write_benchmark(
+    work: Stage,
+    tables: CellTablesArtifact,
+    cells: list[dict[str, JsonValue]],
+    command: str,
+) -> Summary:
+    """Error against run time with median and range, scores, time to target, omissions, machine.
+
+    Output: ``benchmark.html``, and ``error_against_time.png`` where a cell finished. Seconds.
+    """
+    held = work.open(tables)
+    results = BenchmarkResults(
+        cells=[CellRecord.model_validate(cell) for cell in cells],
+        scores=read_runs(ScoreRow, held / "scores.parquet"),
+        curves=read_runs(CurveRow, held / "error_curve.parquet"),
+        times=read_times(held / "time_to_target.parquet"),
+    )
+    write_benchmark_chart(results.curves, work.folder / "error_against_time.png")
+    write_benchmark_page(results, command, work.folder / "benchmark.html")
+    return {
+        "summary": results.summary_records(),
+        "omissions": [omission._asdict() for omission in results.omissions()],
+    }

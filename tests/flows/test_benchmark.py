@@ -1,0 +1,174 @@
+"""The benchmark flow on a toy scene beside one that cannot be read."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from prefect.client.orchestration import get_client
+from pyarrow import parquet
+
+from flows.benchmark_request import BenchmarkRequest
+from flows.command_line import main
+from mocoflow_core.errors import InputError
+from mocoflow_core.metrics.curve import read_curve
+from mocoflow_core.metrics.table import read_scores
+
+METHODS = ("mocoflow", "without_local", "posed_mesh")
+
+
+@pytest.fixture(scope="module")
+def broken_scene(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scenes") / "broken"
+    folder.mkdir()
+    (folder / "scene.json").write_text("{")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def compare(prefect_server, toy_scene, broken_scene, store_url):
+    from flows.benchmark import benchmark as flow
+
+    usual = {
+        "scenes": (str(broken_scene), str(toy_scene)),
+        "methods": METHODS,
+        "presets": ("toy",),
+        "seeds": 2,
+        "store": store_url,
+    }
+    return lambda out, **changes: flow(out=out, **usual | changes)
+
+
+@pytest.fixture(scope="module")
+def first(compare, tmp_path_factory):
+    out = tmp_path_factory.mktemp("benchmarks") / "first"
+    return out, compare(out)
+
+
+def test_every_cell_is_run_and_one_that_fails_stops_no_other(first):
+    _, record = first
+    states = {cell.name: cell.state for cell in record.cells}
+    assert states == {
+        f"{scene}/toy/{method}/{seed}": state
+        for scene, state in (("broken", "failed"), ("toy", "finished"))
+        for method in METHODS[:2]
+        for seed in (0, 1)
+    }
+    assert all("scene.json" in cell.reason for cell in record.cells if cell.state == "failed")
+    assert any("broken/toy/mocoflow, seed 0, 1" == row["what"] for row in record.omissions)
+
+
+def test_prefect_shows_each_cell_by_its_name_and_the_comparison(first):
+    _, record = first
+    with get_client(sync_client=True) as client:
+        runs = {run.name: run for run in client.read_flow_runs()}
+        shown = {artifact.key: artifact for artifact in client.read_artifacts()}
+    assert "data:image/png" in shown["benchmark"].data
+    assert "broken/toy/mocoflow" in shown["benchmark"].data
+    assert "posed_mesh" in shown["benchmark-scores"].data
+    for cell in record.cells:
+        assert runs[cell.name].parent_task_run_id
+        assert runs[cell.name].state.is_completed() == (cell.state == "finished")
+
+
+def test_the_tables_hold_every_method_seed_and_preset(first):
+    out, _ = first
+    for name, read in (("scores.parquet", read_scores), ("error_curve.parquet", read_curve)):
+        cells = {(row.scene, row.method, row.seed) for row in read(out / name)}
+        assert cells == {("toy", method, seed) for method in METHODS for seed in (0, 1)}
+        assert set(parquet.read_table(out / name)["preset"].to_pylist()) == {"toy"}
+
+
+def test_scores_of_a_method_are_those_of_its_runs(first):
+    out, record = first
+    alone = read_scores(out / "cells/toy/toy/without_local/1/scores.parquet")
+    together = read_scores(out / "scores.parquet")
+    assert [row.value for row in together if (row.method, row.seed) == ("without_local", 1)] == [
+        row.value for row in alone if row.method == "mocoflow"
+    ]
+    [summary] = [
+        row
+        for row in record.summary
+        if (row["method"], row["metric"]) == ("posed_mesh", "psnr_union")
+    ]
+    assert (summary["seeds"], summary["low"]) == (2, summary["high"])  # Nothing random in it.
+
+
+def test_a_benchmark_leaves_its_page_chart_times_and_record(first):
+    out, record = first
+    assert json.loads((out / "benchmark.json").read_text())["command"] == record.command
+    assert record.command in (out / "benchmark.html").read_text().replace("&#39;", "'")
+    assert (out / "error_against_time.png").stat().st_size > 0
+    times = parquet.read_table(out / "time_to_target.parquet").to_pylist()
+    assert {(row["method"], row["seeds"]) for row in times} == {(m, 2) for m in METHODS}
+
+
+def test_a_second_benchmark_computes_nothing_and_leaves_the_same(first, compare, store_url):
+    out, record = first
+
+    def touched():
+        files = [*(out / "cells").rglob("*"), *Path(store_url).glob("*/*/manifest.json")]
+        return {file: file.stat().st_mtime_ns for file in files}
+
+    before = touched()
+    assert compare(out) == record
+    assert touched() == before
+
+
+def test_elsewhere_its_cells_come_from_the_store(first, compare, toy_scene, tmp_path):
+    out, _ = first
+    again = compare(tmp_path / "again", scenes=(str(toy_scene),), methods=METHODS[:1], seeds=1)
+    [cell] = again.cells
+    assert cell.from_store
+    alone = [row for row in read_scores(out / "scores.parquet") if row.method == "mocoflow"]
+    assert read_scores(tmp_path / "again/scores.parquet") == [r for r in alone if r.seed == 0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "because"),
+    [
+        ({"scenes": ("swim",)}, "known name"),
+        ({"scenes": ("no/such/folder",)}, "Check the path"),
+        ({"scenes": ("turn", "walk,name=turn")}, "different names"),
+        ({"scenes": ()}, "has a scene"),
+        ({"seeds": 0}, "has a scene, a seed"),
+        ({"methods": ("posed_mesh",)}, "a method that is run"),
+        ({"methods": ("without_luck",)}, "--methods must be"),
+        ({"methods": ("mocoflow", "mocoflow")}, "--methods must be different"),
+        ({"presets": ("fats",)}, "fast, toy"),
+        ({"settings": ("schedule.ray=1",)}, "schedule.rays"),
+        ({"targets": ("psnr",)}, "psnr_union=20"),
+    ],
+)
+def test_what_no_cell_could_run_with_is_refused_before_any(changes, because, tmp_path):
+    request = BenchmarkRequest(**{"scenes": ("turn",), "out": tmp_path / "out", **changes})
+    with pytest.raises(InputError, match=because):
+        request.claim()
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_line_refuses_likewise_and_takes_several_values(monkeypatch, capsys, tmp_path):
+    words = ["benchmark", "--scenes", "turn", "walk", "--methods", "mocoflow", "without_luck"]
+    monkeypatch.setattr(sys, "argv", ["mocoflow", *words, "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert "without_luck" in capsys.readouterr().err
+
+
+def test_the_command_of_a_benchmark_asks_for_the_same_again(tmp_path):
+    request = BenchmarkRequest(
+        scenes=("turn,seed=1",),
+        out=tmp_path / "a folder",
+        methods=("mocoflow",),
+        seeds=2,
+        budget_s=30.0,
+        settings=("schedule.rays=64",),
+        targets=("psnr=20",),
+    )
+    assert request.command == (
+        "mocoflow benchmark --scenes turn,seed=1 --methods mocoflow --presets fast --seeds 2 "
+        f"--out '{tmp_path}/a folder' --budget 30 --set schedule.rays=64 --targets psnr=20"
+    )
