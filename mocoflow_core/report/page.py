@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jinja2
 from markupsafe import Markup
 
 from mocoflow_core.metrics.curve import read_curve, training_spans
@@ -18,8 +17,7 @@ from mocoflow_core.report.held_out_views import held_out_views
 from mocoflow_core.report.inputs import BASELINE, ReportInputs
 from mocoflow_core.report.metric_labels import BODY_METRICS
 from mocoflow_core.report.score_tables import headlines, repairs, view_table
-
-FOLDER = Path(__file__).parent
+from mocoflow_core.report.template import FOLDER, render
 
 
 class StageBar(NamedTuple):
@@ -34,32 +32,7 @@ class StageBar(NamedTuple):
 
 def write_report(inputs: ReportInputs, path: Path) -> None:
     """Write the page of a run; it holds its pictures and videos and stays below 15 MB."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FOLDER),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters["seconds"] = seconds_text
-    environment.filters["words"] = lambda name: str(name).replace("_", " ")
-    page = environment.get_template("page.html").render(_context(inputs))
-    path.write_text(page, encoding="utf-8")
-
-
-def seconds_text(seconds: float) -> str:
-    """Seconds for people: ``0.4 s``, ``12 s``, ``3 min 20 s``, ``2 h 05 min``."""
-    if seconds < 9.95:
-        return f"{seconds:.1f} s"
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    minutes, rest = divmod(whole, 60)
-    return f"{minutes} min {rest:02d} s" if minutes < 60 else _hours(minutes)
-
-
-def _hours(minutes: int) -> str:
-    return f"{minutes // 60} h {minutes % 60:02d} min"
+    path.write_text(render("page.html", _context(inputs)), encoding="utf-8")
 
 
 def _context(inputs: ReportInputs) -> dict[str, Any]:
@@ -76,7 +49,6 @@ def _context(inputs: ReportInputs) -> dict[str, Any]:
         else None
     )
     return {
-        "style": Markup((FOLDER / "page.css").read_text()),
         "script": Markup((FOLDER / "page.js").read_text()),
         "run": run,
         "method": inputs.method,

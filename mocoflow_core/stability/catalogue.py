@@ -1,4 +1,4 @@
-"""All areas and their cases. A new area is one file with its ``CASES`` and one line here."""
+"""All areas and their cases. A new area is one file with its ``CASES`` and its name here."""
 
 from __future__ import annotations
 
@@ -6,15 +6,43 @@ from collections.abc import Sequence
 from typing import Any
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.stability import compositing, encoding, rays_and_boxes, se3
+from mocoflow_core.stability import (
+    compositing,
+    encoding,
+    location_search,
+    mesh,
+    motion_consensus,
+    optimisation,
+    planted_faults,
+    precision,
+    rays_and_boxes,
+    scale,
+    se3,
+)
 from mocoflow_core.stability.case import Case
 
+MODULES = (
+    se3,
+    encoding,
+    compositing,
+    rays_and_boxes,
+    motion_consensus,
+    mesh,
+    location_search,
+    optimisation,
+    planted_faults,
+    scale,
+    precision,
+)
 AREAS: dict[str, tuple[Case[Any], ...]] = {
-    "se3": se3.CASES,
-    "encoding": encoding.CASES,
-    "compositing": compositing.CASES,
-    "rays_and_boxes": rays_and_boxes.CASES,
+    module.__name__.rpartition(".")[2]: module.CASES for module in MODULES
 }
+
+
+def about(area: str) -> str:
+    """What an area is about: the first line of its file."""
+    documents = dict(zip(AREAS, (module.__doc__ for module in MODULES), strict=True))
+    return (documents[area] or "").splitlines()[0]
 
 
 def require_areas(names: Sequence[str]) -> tuple[str, ...]:

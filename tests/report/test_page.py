@@ -15,7 +15,8 @@ from mocoflow_core.io.video import write_video
 from mocoflow_core.metrics.curve import CurveRow, write_curve
 from mocoflow_core.metrics.table import ScoreRow, write_scores
 from mocoflow_core.report.inputs import ReportInputs
-from mocoflow_core.report.page import seconds_text, write_report
+from mocoflow_core.report.page import write_report
+from mocoflow_core.report.template import seconds_text
 
 SIZE = 40
 FRAMES = [4, 9, 14]
