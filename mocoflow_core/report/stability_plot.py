@@ -18,15 +18,17 @@ FAILED = "#be123c"
 # An error of zero has no place on a logarithmic axis: it stands at the bottom, this far below.
 DECADES_BELOW = 2.0
 EXACT = 1e-18
+MOST_TICKS = 5
 
 
 def plot_sweeps(rows: Sequence[StabilityRow]) -> Figure | None:
-    """One panel for each case of an area that sweeps something; None where there is none."""
-    cases = [
-        sweep
+    """One panel for each case of an area that has something to show; None where none has."""
+    sweeps = [
+        [row for row in rows if row.case == name]
         for name in dict.fromkeys(row.case for row in rows)
-        if len(sweep := [row for row in rows if row.case == name]) > 1
     ]
+    # Refusals have neither error nor bound.
+    cases = [s for s in sweeps if len(s) > 1 and any(row.bound > 0 or row.error != 0 for row in s)]
     if not cases:
         return None
     lines = -(-len(cases) // COLUMNS)
@@ -50,7 +52,8 @@ def _panel(axes: Axes, sweep: Sequence[StabilityRow]) -> None:
     places = _places(axes, sweep)
     axes.set_yscale("log")
     axes.plot(places, np.maximum(bounds, floor), color=WARM, lw=1.2, ls=(0, (5, 3)), zorder=2)
-    axes.plot(places, np.maximum(errors, floor), color=ACCENT, lw=1.6, zorder=3)
+    if sweep[0].number is not None:
+        axes.plot(places, np.maximum(errors, floor), color=ACCENT, lw=1.6, zorder=3)
     for place, row in zip(places, sweep, strict=True):
         known = math.isfinite(row.error)
         height = max(row.error, floor) if known else max(row.bound, floor)
@@ -66,6 +69,16 @@ def _panel(axes: Axes, sweep: Sequence[StabilityRow]) -> None:
     axes.margins(y=0.14)
 
 
+def _decades(axes: Axes, positive: Sequence[float], zero: bool) -> None:
+    """A logarithmic axis that has a place for zero, with a handful of ticks."""
+    axes.set_xscale("symlog", linthresh=min(positive), linscale=0.5)
+    low, high = (math.floor(math.log10(value)) for value in (min(positive), max(positive)))
+    step = max(math.ceil((high - low) / (MOST_TICKS - 1)), 1)
+    ticks = [10.0**decade for decade in range(high, low - 1, -step) if decade > -300]
+    axes.set_xticks([0.0, *reversed(ticks)] if zero else list(reversed(ticks)))
+    axes.set_xlim(left=-0.2 * min(positive) if zero else 0.7 * min(positive))
+
+
 def _floor(errors: np.ndarray, bounds: np.ndarray) -> float:
     """Where an error of zero is drawn: below everything that has a place of its own."""
     seen = np.concatenate([errors[errors > 0], bounds[bounds > 0]])
@@ -79,13 +92,13 @@ def _places(axes: Axes, sweep: Sequence[StabilityRow]) -> np.ndarray:
     if len(known) == len(sweep) and all(math.isfinite(number) for number in known):
         positive = [number for number in known if number > 0]
         if min(known) >= 0 and len(positive) > 1 and max(positive) > 100 * min(positive):
-            axes.set_xscale("symlog", linthresh=min(positive), linscale=0.5)
+            _decades(axes, positive, 0.0 in known)
         return np.array(known)
-    axes.set_xticks(
-        range(len(sweep)),
-        [row.value.replace(", ", "\n") for row in sweep],
-        rotation=0 if len(sweep) < 5 and max(len(row.value) for row in sweep) < 9 else 25,
-        ha="center" if len(sweep) < 5 and max(len(row.value) for row in sweep) < 9 else "right",
-        fontsize=7.5,
-    )
+    axes.set_xticks(range(len(sweep)), [_broken(row.value) for row in sweep], fontsize=7.5)
+    axes.margins(x=0.12)
     return np.arange(len(sweep), dtype=float)
+
+
+def _broken(words: str) -> str:
+    """One word a line."""
+    return words.replace(" ", "\n")

@@ -254,7 +254,7 @@ CASES = (
     Case(
         "strong_distortion",
         "a strong barrel distortion folds the corners back into the image",
-        "k1",
+        "k1 of the lens",
         (-1.0, -0.5, -0.3, -0.1, 0.0, 0.3, 1.0),
         "OpenCV's projection; a lens that folds is refused in words",
         _lens,

@@ -12,12 +12,15 @@ ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "deployments" / "prefect.yaml").read_text())["deployments"]
 
 
-def test_both_deployments_are_there():
-    assert [deployment["name"] for deployment in DEPLOYMENTS] == ["full", "fast"]
+FLOWS = {"full": "mocoflow", "fast": "mocoflow", "nightly": "stability"}
+
+
+def test_all_deployments_are_there():
+    assert [deployment["name"] for deployment in DEPLOYMENTS] == list(FLOWS)
 
 
 @pytest.mark.parametrize("deployment", DEPLOYMENTS, ids=lambda d: d["name"])
 def test_a_deployment_loads_and_its_parameters_are_valid(deployment):
     flow = load_flow_from_entrypoint(deployment["entrypoint"])
-    assert flow.name == "mocoflow"
+    assert flow.name == FLOWS[deployment["name"]]
     flow.validate_parameters(deployment["parameters"])
