@@ -7,6 +7,7 @@ from typing import Any
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.stability import (
+    broken_recordings,
     compositing,
     encoding,
     location_search,
@@ -31,6 +32,7 @@ MODULES = (
     location_search,
     optimisation,
     planted_faults,
+    broken_recordings,
     scale,
     precision,
 )

@@ -10,28 +10,18 @@ from mocoflow_core.capture.clip import Clip
 from mocoflow_core.stability.case import Case, Found, require
 from mocoflow_core.stability.toy_scene import (
     SCHEDULE,
-    Outcome,
     filmed,
     prepare,
     toy,
     train,
     undisturbed,
 )
+from mocoflow_core.stability.usable_scene import USABLE_DB, WHY_USABLE, lost
 from mocoflow_core.training.guard import TrainingDiverged
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
 
-# A scene is usable as long as it is not much worse than the posed body without any colours, which
-# is 2 dB below the undisturbed scene.
-USABLE_DB = 3.0
 SHORT = SCHEDULE.model_copy(update={"coarse_steps": 20, "fine_steps": 10})
 _RATES = ("rate_features", "rate_networks", "rate_motion")
-
-
-def _lost(outcome: Outcome) -> Found:
-    """Decibels below the undisturbed scene; what the guard did stands in the remark."""
-    words = "; ".join(outcome.events[:3])
-    lost = max(undisturbed().psnr - outcome.psnr, 0.0)
-    return Found(lost, (*outcome.weights, outcome.psnr), f"{outcome.psnr:.1f} dB. {words}".strip())
 
 
 def _faster(factor: float) -> ScheduleConfig:
@@ -48,7 +38,7 @@ def _rate(factor: float) -> Found:
         return Found(0.0, remark=f"stopped: {stopped}")
     require(factor < 100 or bool(outcome.events), "a run that went astray says nothing")
     require(factor > 4 or not outcome.events, f"a healthy run is disturbed: {outcome.events}")
-    return _lost(outcome)
+    return lost(outcome, outcome.events)
 
 
 def _rays(count: float) -> Found:
@@ -108,8 +98,7 @@ CASES = (
         _rate,
         USABLE_DB,
         "dB",
-        "a posed body of one colour is 2 dB below it, one gone astray 4 to 9 dB; the guard must "
-        "have brought it back, or have stopped in words",
+        f"{WHY_USABLE}; the guard must have brought it back, or have stopped in words",
         quick=False,
     ),
     Case(
