@@ -16,6 +16,7 @@ from torch import Tensor, nn
 # Losses vary with the rays that are drawn. What counts is the median of the last steps, at least so
 # many of them and so many rays.
 _RECENT_STEPS = 10
+_FEWEST_STEPS = 5
 _RECENT_RAYS = 1000
 # A rise above the best by the first factor is met at once, by the second when a state is to be
 # kept: a scene in which nothing is left to see costs two to four times the losses of its start.
@@ -64,7 +65,7 @@ class Guard:
 
     def expect(self, loss: float) -> None:
         """What the losses sum to at the start, over many rays."""
-        self._best = loss
+        self._best = loss if math.isfinite(loss) else math.inf
 
     def remember(self) -> None:
         """Take the present state as good, unless it is not finite."""
@@ -85,8 +86,12 @@ class Guard:
         return decline
 
     def decline(self) -> str | None:
-        """Whether the steps since the last refusal, however few, are worse than the best ones."""
-        return self._risen(_WORSE)
+        """Whether the last steps are worse than the best ones, or too few since a refusal."""
+        if len(self._recent) >= _FEWEST_STEPS:
+            return self._risen(_WORSE)
+        if self.events and self._recent:
+            return f"only {len(self._recent)} steps since the last refusal: too few to trust"
+        return None
 
     def problem(self, terms: dict[str, Tensor]) -> str | None:
         """What is wrong with a step, in words; None if all is well.

@@ -232,10 +232,26 @@ def test_a_state_is_kept_only_where_the_last_steps_prove_it_good():
     assert same(run.state(), better)
 
 
-def test_after_a_refusal_old_losses_are_forgotten():
+def test_after_a_refusal_old_losses_are_forgotten_and_a_few_new_ones_prove_nothing():
     run = Run()
     run.guard.expect(0.02)
     look(run, 0.5, 10)
     run.guard.refuse(10, "x")
+    assert run.guard.decline() is None  # the state is the good one
+    assert look(run, 0.02, 1) is None
+    assert "too few" in run.guard.decline()
+    look(run, 0.02, 4)
     assert run.guard.decline() is None
-    assert look(run, 0.5, 1) is None
+
+
+def test_a_run_of_a_step_or_two_without_any_refusal_is_not_judged():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.5, 2)
+    assert run.guard.decline() is None
+
+
+def test_a_start_that_is_not_finite_expects_nothing():
+    run = Run()
+    run.guard.expect(float("nan"))
+    assert look(run, 5.0, 20) is None
