@@ -43,11 +43,14 @@ def _missed(camera: Camera) -> Found:
     shell = shell_pixels(camera, toy().motion.body, 0, SHELL_M)
     reached = np.zeros(mask.size, bool)
     reached[shell.pixels.numpy()] = True
-    depths = camera.to_camera(body.vertices[0].astype(np.float64))[:, 2]
-    ahead = largest(np.maximum(float(shell.nearest.min()) - depths.min(), 0.0))
-    require(ahead == 0.0, f"the body sticks out of its shell by {ahead} m")
-    require(bool(mask.any()), "no pixel shows the body")
-    return Found(float((mask.ravel() & ~reached).sum()), (shell.nearest, shell.farthest))
+    points = body.vertices[0].astype(np.float64)
+    columns, rows = np.floor(camera.project(points)).T
+    inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
+    depths = camera.to_camera(points)[inside, 2]
+    ahead = float(shell.nearest.min()) - depths.min() if inside.any() else 0.0
+    require(ahead <= 0.0, f"the body sticks out of its shell by {ahead} m")
+    words = f"{mask.sum()} pixels show the body"
+    return Found(float((mask.ravel() & ~reached).sum()), (shell.nearest, shell.farthest), words)
 
 
 def _distance(distance_m: float) -> Found:
@@ -56,6 +59,21 @@ def _distance(distance_m: float) -> Found:
 
 def _resolution(side_px: float) -> Found:
     return _missed(_camera_at(3.0, int(side_px)))
+
+
+def _aside(metres: float) -> Found:
+    """The person walks out of the picture; a clip that never shows the person is refused."""
+    camera = _camera_at(3.0, toy().clip.camera.width)
+    camera = replace(camera, t=camera.t + np.array([metres, 0.0, 0.0]))
+    found = _missed(camera)
+    prepared = replace(toy(), clip=replace(toy().clip, camera=camera))
+    try:
+        drawn = prepared.pixels().batch(64, 4, torch.Generator().manual_seed(0))
+    except InputError as error:
+        require("in sight" in str(error) and metres > 2.0, f"refused without a cause: {error}")
+        return Found(found.error, found.watched, f"refused: {error}")
+    require(metres < 10.0, "rays through a picture that shows nobody")
+    return Found(found.error, (*found.watched, drawn.near, drawn.far, drawn.rgb), found.remark)
 
 
 def _ray_ends(distance_m: float) -> Found:
@@ -152,6 +170,17 @@ CASES = (
         "px",
         "exact: a pixel without rays is a hole",
         quick=False,
+    ),
+    Case(
+        "leaving_the_image",
+        "a person half in the picture, at its edge, and gone",
+        "aside, m",
+        (0.0, 0.5, 1.0, 1.5, 50.0),
+        "every pixel of the silhouette gets rays; refused where there is none in the clip",
+        _aside,
+        0.0,
+        "px",
+        "exact: a pixel without rays is a hole",
     ),
     Case(
         "far_camera",
