@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test check format
+.PHONY: install demo test stability check format
 
 install: $(INSTALLED)
 
@@ -17,6 +17,9 @@ demo: install
 
 test: install
 	$(BIN)/python -m pytest
+
+stability: install
+	$(BIN)/mocoflow stability --out stability
 
 check: install
 	$(BIN)/ruff format --check .

@@ -213,6 +213,29 @@ def synth(
 
 
 @app.command()
+def stability(
+    out: Annotated[Path, typer.Option(help="New folder for table, plots and page.")],
+    areas: Annotated[
+        list[str] | None,
+        typer.Option("--area", metavar="NAME", help="Only this area; may be repeated."),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out what trains scenes.")] = False,
+) -> None:
+    """Check stiff and extreme cases against their bounds; exit code 1 when one fails."""
+    set_environment()
+    from flows.stability import CasesFailed
+    from flows.stability import stability as flow
+
+    try:
+        with undisturbed():
+            summary = flow(out=out, areas=tuple(areas or ()), quick_only=quick)
+    except CasesFailed as failed:
+        typer.echo(f"{failed}\nStability: {out / 'stability.html'}")
+        raise typer.Exit(1) from failed
+    typer.echo(f"{summary}\nStability: {out / 'stability.html'}")
+
+
+@app.command()
 def demo(
     out: Annotated[Path, typer.Option(help="New folder for the results.")] = Path("demo"),
     seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,

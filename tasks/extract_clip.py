@@ -6,10 +6,11 @@ from mocoflow_core.artifacts import ClipArtifact
 from mocoflow_core.capture import extract
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.capture.strange_frames import sound_clip
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Broken frames are left out, silent masks not believed.
 
 
 @stage(ClipArtifact, ALGORITHM_VERSION)
@@ -19,7 +20,8 @@ def extract_clip(work: Stage, recording: Source, capture: CaptureConfig) -> Summ
     Output: ``clip.json`` and an ``.npy`` file for each array of the clip. A few seconds.
     """
     scene = open_scene(recording.path)
-    clip = extract.extract_clip(scene, capture)
+    extracted = extract.extract_clip(scene, capture)
+    clip, warnings = sound_clip(extracted, capture.difference_threshold)
     clip.save(work.folder)
     return {
         "frames": len(clip.frame_indices),
@@ -30,4 +32,5 @@ def extract_clip(work: Stage, recording: Source, capture: CaptureConfig) -> Summ
         "source_fps": scene.description.fps,
         "up": scene.up.tolist(),
         "camera": {"name": clip.camera.name, **clip.camera.to_json()},
+        "warnings": list(warnings),
     }

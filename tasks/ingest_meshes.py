@@ -8,7 +8,7 @@ from mocoflow_core.capture.scene import open_scene
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Faces wind outwards; frozen and flipping estimates are noticed.
 
 
 @stage(MeshArtifact, ALGORITHM_VERSION)

@@ -9,7 +9,7 @@ from mocoflow_core.body.location import LocationConfig
 from mocoflow_core.capture.clip import Clip
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Beyond the image a body is not missed; a bad start is replaced.
 
 
 @stage(LocationArtifact, ALGORITHM_VERSION)

@@ -23,7 +23,7 @@ from mocoflow_core.training.optimise_scene import Learned
 from mocoflow_core.training.schedule import ScheduleConfig
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # The guard goes back from losses that rise, and at the end.
 
 
 @stage(SceneArtifact, ALGORITHM_VERSION, resumes=True)

@@ -50,13 +50,13 @@ def search_grid(
     A level tries ``depths`` distances from 1/(1 + span) to 1 + span times the best so far; at each
     distance all lateral shifts of the drawn body at once, by correlation with the mask.
     """
-    spectrum = np.fft.rfft2(crop.coverage, (2 * crop.side_px,) * 2)
+    spectra = np.fft.rfft2(np.stack([crop.coverage, crop.seen]), (2 * crop.side_px,) * 2)
     best = Placement(start, 0.0)
     for span in spans:
         factors = (1 + span) ** np.linspace(-1, 1, depths)
         for _ in range(REPEATS):
             tried = [
-                _best_shift(points, faces, crop, spectrum, _moved(points, best.translation, factor))
+                _best_shift(points, faces, crop, spectra, _moved(points, best.translation, factor))
                 for factor in factors
             ]
             choice = int(np.argmax([placement.overlap for placement in tried]))
@@ -76,13 +76,17 @@ def _best_shift(
     points: Array,
     faces: NDArray[np.int32],
     crop: MaskCrop,
-    spectrum: NDArray[np.complex128],
+    spectra: NDArray[np.complex128],
     translation: Array,
 ) -> Placement:
+    """The best lateral shift; ``spectra`` (2, S', S'') of the mask and of what the image shows.
+
+    What a shift moves beyond the image's border counts for nothing.
+    """
     drawn = crop.draw(points + translation, faces)
     size = (2 * crop.side_px,) * 2
-    common = np.fft.irfft2(spectrum * np.conj(np.fft.rfft2(drawn, size)), size)
-    union = crop.coverage.sum() + drawn.sum() - common
+    common, inside = np.fft.irfft2(spectra * np.conj(np.fft.rfft2(drawn, size)), size)
+    union = crop.coverage.sum() + inside - common
     overlaps = common / np.maximum(union, 1e-6)
     row, column = np.unravel_index(int(overlaps.argmax()), size)
     shift = np.array([column, row], np.float64)

@@ -16,9 +16,11 @@ from mocoflow_core.body.mesh_checks import (
     require_frames,
     require_in_front,
     require_metres,
+    require_near_origin,
     require_shapes,
 )
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.motion_checks import check_frozen, check_turns
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
@@ -87,13 +89,14 @@ def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> Ingested
     if description.coordinates == "camera":
         world = camera.to_world(joined.vertices.astype(np.float64))
         joined = replace(joined, vertices=world.astype(np.float32))
+    require_near_origin(joined)
     if located:
         require_in_front(joined, camera)
     return IngestedMeshes(
         joined,
         "camera-root-centred" if root_centred else "world",
         located,
-        face_warnings + gap_warnings,
+        face_warnings + gap_warnings + check_frozen(raw) + check_turns(raw),
     )
 
 
@@ -145,14 +148,20 @@ def _description(
 
 
 def _proper_faces(meshes: MeshSequence) -> tuple[NDArray[np.int32], tuple[str, ...]]:
-    """The faces without those that name a vertex twice: they have neither area nor normal."""
-    faces = meshes.faces
+    """The faces that have three vertices, winding so that their normals point outwards."""
+    faces, warnings = meshes.faces, []
     proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    if proper.all():
-        return faces, ()
     if not proper.any():
         raise InputError("faces with three vertices each", "none", "Correct the faces.")
-    return faces[proper], (f"{(~proper).sum()} faces name a vertex twice and are left out",)
+    if not proper.all():
+        warnings.append(f"{(~proper).sum()} faces name a vertex twice and are left out")
+        faces = faces[proper]
+    body = meshes.vertices[0].astype(np.float64)
+    first, second, third = np.moveaxis((body - body.mean(axis=0))[faces], 1, 0)
+    if (first * np.cross(second, third)).sum() < 0:
+        warnings.append("the faces wind inwards and are turned over")
+        faces = np.ascontiguousarray(faces[:, ::-1])
+    return faces, tuple(warnings)
 
 
 def _joined(

@@ -158,8 +158,11 @@ def _place(
     grid = MaskCrop.around(mask, clip.camera, configuration.grid_px, pad)
     fine = MaskCrop.around(mask, clip.camera, configuration.outline_px, pad)
     faces = ingested.meshes.faces
-    root_centred = ingested.coordinates == "camera-root-centred"
-    start = first_guess(points, faces, grid) if root_centred else np.zeros(3)
+    starts = [first_guess(points, faces, grid)]
+    if ingested.coordinates != "camera-root-centred":
+        starts.append(np.zeros(3))
+    # A given place far nearer than the true one fills the crop, where no shift improves it.
+    start = max(starts, key=lambda start: _overlap(points + start, faces, grid))
     front = facing(points + start, faces)
     best = search_grid(points, front, grid, start, configuration.spans, configuration.depths)
     front = facing(points + best.translation, faces)
@@ -175,7 +178,7 @@ def _place(
 
 
 def _overlap(points: Array, faces: NDArray[np.int32], crop: MaskCrop) -> float:
-    drawn, mask = crop.draw(points, faces), crop.coverage > 0.5
+    drawn, mask = crop.draw(points, faces) & crop.seen, crop.coverage > 0.5
     return float((drawn & mask).sum() / max((drawn | mask).sum(), 1))
 
 

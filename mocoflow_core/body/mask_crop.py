@@ -20,10 +20,15 @@ BLUR_PX = 0.4
 
 @dataclass(frozen=True, eq=False)
 class MaskCrop:
-    """A square around the mask. Bodies in the camera's axes can be drawn into it."""
+    """A square around the mask. Bodies in the camera's axes can be drawn into it.
+
+    The part of the crop that lies beyond the image's border says nothing of the body.
+    """
 
     coverage: NDArray[np.float32]  # (S, S) share of each pixel that the mask covers
     K: Array  # intrinsics of the crop, corner origin
+    rows: slice  # of the crop that lie in the image
+    columns: slice
 
     @classmethod
     def around(cls, mask: NDArray[np.bool_], camera: Camera, side_px: int, pad: float) -> MaskCrop:
@@ -36,11 +41,31 @@ class MaskCrop:
         # From pixels of the image to pixels of the crop, both with the corner origin.
         to_crop = np.array([[scale, 0, -scale * corner[0]], [0, scale, -scale * corner[1]]])
         K = np.vstack([to_crop, [0, 0, 1]]) @ camera.K
-        return cls(_resampled(mask, to_crop, scale, side_px), K)
+        height, width = mask.shape
+        return cls(
+            _resampled(mask, to_crop, scale, side_px),
+            K,
+            _seen(to_crop[1, 2], scale * height, side_px),
+            _seen(to_crop[0, 2], scale * width, side_px),
+        )
 
     @property
     def side_px(self) -> int:
         return len(self.coverage)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Pixels (S, S) that lie in the image."""
+        inside = np.zeros(self.coverage.shape, bool)
+        inside[self.rows, self.columns] = True
+        return inside
+
+    def beyond(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """A mask (S, S) that goes on beyond the image as it is at the border: no edge is there."""
+        height, width = mask.shape
+        above_and_below = (self.rows.start, height - self.rows.stop)
+        beside = (self.columns.start, width - self.columns.stop)
+        return np.pad(mask[self.rows, self.columns], (above_and_below, beside), mode="edge")
 
     @property
     def focal_px(self) -> float:
@@ -55,6 +80,12 @@ class MaskCrop:
         """Pixels of the crop (..., 2) of points in the camera's axes."""
         projected = points_camera @ self.K.T
         return projected[..., :2] / np.maximum(projected[..., 2:], NEAR_M)
+
+
+def _seen(start: float, length: float, side_px: int) -> slice:
+    """The pixels of the crop that lie wholly between two borders of the image."""
+    first = min(max(int(np.ceil(start)), 0), side_px - 1)
+    return slice(first, min(max(int(np.floor(start + length)), first + 1), side_px))
 
 
 def _resampled(

@@ -18,11 +18,14 @@ UNIT_SIZES_M = {
     "inches": 0.0254,
     "decimetres": 0.1,
     "decametres": 10.0,
+    "hectometres": 100.0,
     "kilometres": 1000.0,
 }
 TYPICAL_SIZE_M = 1.7
 # Nobody is filmed from nearer or farther; ten times that is a matter of units.
 PLAUSIBLE_DISTANCE_M = (0.1, 150.0)
+# float32 tells a millimetre apart up to here; coordinates of a map are farther off.
+FARTHEST_M = 1e4
 # Longer gaps are not bridged: a limb can turn round in the meantime.
 LONGEST_GAP_S = 0.25
 
@@ -104,6 +107,17 @@ def require_frames(meshes: MeshSequence, expected: NDArray[np.int32], fps: float
             f"gaps up to {LONGEST_GAP_S} s inside apart",
             f"{counts}, none for frame {missing[0]}",
             action,
+        )
+
+
+def require_near_origin(meshes: MeshSequence) -> None:
+    """Raise InputError where coordinates are too large for float32 to hold a body's shape."""
+    farthest = float(np.abs(meshes.vertices).max())
+    if farthest > FARTHEST_M:
+        raise InputError(
+            f"coordinates must lie within {FARTHEST_M / 1000:g} km of the origin",
+            f"one of {farthest:.4g} m",
+            "Subtract one offset from the meshes and from all camera positions (t + R offset).",
         )
 
 

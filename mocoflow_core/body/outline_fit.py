@@ -41,12 +41,13 @@ class _Shape:
     slope: Array  # (S, S, 2) its gradient in x and y
 
     @classmethod
-    def of(cls, mask: Mask) -> Self:
-        # The crop's own border is no outline.
+    def of(cls, mask: Mask, crop: MaskCrop) -> Self:
+        # Neither the crop's own border nor the image's is an outline.
+        mask = crop.beyond(mask)
         inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1)
         distance = signed_distance(mask).astype(np.float64)
         slope = np.stack([np.gradient(distance, axis=1), np.gradient(distance, axis=0)], axis=-1)
-        return cls(np.argwhere(mask & (inner == 0)), distance, slope)
+        return cls(np.argwhere(mask & (inner == 0) & crop.seen), distance, slope)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +84,11 @@ def fit_outline(
     usually is; limbs in another pose must not pass for it. Returns the best translation met,
     ``start`` among them.
     """
-    target = _Shape.of(crop.coverage > 0.5)
+    target = _Shape.of(crop.coverage > 0.5, crop)
     best, least = start, np.inf
     translation = start
     for _ in range(iterations + 1):
-        body = _Shape.of(crop.draw(points + translation, faces))
+        body = _Shape.of(crop.draw(points + translation, faces), crop)
         offsets = _both_ways(body, target)
         if len(offsets.off) < LEAST_POINTS:
             break

@@ -11,6 +11,8 @@ Masks = NDArray[np.bool_]  # (T, H, W), true on the person
 
 # Patches of the smaller image side; large enough for a sharp correlation peak.
 PATCH_SHARE = 0.25
+# A smaller patch has no peak to speak of.
+LEAST_PATCH_PX = 4
 # Below this standard deviation (of 255) a patch shows nothing that could be seen moving.
 LEAST_TEXTURE = 4.0
 
@@ -21,9 +23,11 @@ def background_motion_px(frames: Frames, masks: Masks) -> float:
     Phase correlation of patches which the person covers in neither frame, the median over patches:
     something that moves in one corner of the background is no moving camera.
     """
+    side = int(PATCH_SHARE * min(frames.shape[1:3]))
+    if side < LEAST_PATCH_PX:
+        return float("nan")
     grey = np.stack([cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY) for frame in frames])
     grey = grey.astype(np.float64)
-    side = int(PATCH_SHARE * min(grey.shape[1:]))
     shifts = [
         _median_shift(grey[0], grey[row], masks[0] | masks[row], side)
         for row in range(1, len(grey))

@@ -9,10 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
 # Pixel centres of the corner origin.
 _HALF_PIXEL = 0.5
+# Radii at which a lens model is looked at.
+_RADII = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,11 @@ class WorkingView:
 
     @classmethod
     def of(cls, source: Camera, max_side: int) -> WorkingView:
-        """The view whose longer side has at most ``max_side`` pixels; never enlarged."""
+        """The view whose longer side has at most ``max_side`` pixels; never enlarged.
+
+        Raises InputError for a lens model that shows a place of the image twice.
+        """
+        _require_no_fold(source)
         scale = min(1.0, max_side / max(source.width, source.height))
         width, height = round(source.width * scale), round(source.height * scale)
         return cls(source, source.undistorted().resized(max(width, 1), max(height, 1)))
@@ -59,6 +66,22 @@ class WorkingView:
         # cv2.remap has pixel centres at integers.
         places = (distort(pixels, self.source) - _HALF_PIXEL).astype(np.float32)
         return places[..., 0].copy(), places[..., 1].copy()
+
+
+def _require_no_fold(camera: Camera) -> None:
+    """A radius of the ideal picture must never move inwards while it grows."""
+    corners = np.array([[x, y, 1.0] for x in (0, camera.width) for y in (0, camera.height)])
+    rays = corners @ np.linalg.inv(camera.K).T
+    r2 = np.linspace(0, 1, _RADII) ** 2 * (rays[:, :2] ** 2).sum(axis=-1).max()
+    k1, k2, _, _, k3 = camera.distortion
+    growth = 1 + r2 * (3 * k1 + r2 * (5 * k2 + r2 * 7 * k3))
+    if (growth <= 0).any():
+        share = float(np.sqrt(r2[growth <= 0][0] / r2[-1]))
+        raise InputError(
+            f"the distortion of {camera.name} must be one to one over its image",
+            f"one that folds back at {100 * share:.0f} % of the way to the corner",
+            "Calibrate with fewer coefficients, or undistort the frames and give zeros.",
+        )
 
 
 def distort(pixels: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:

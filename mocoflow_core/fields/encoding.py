@@ -7,6 +7,11 @@ import math
 import torch
 from torch import Tensor, nn
 
+from mocoflow_core.errors import InputError
+
+# A rounding of the coordinate may move the phase of the highest band by 2^-5 of half a turn.
+_DIGITS_LEFT = 5
+
 
 def band_weights(band_alpha: float, bands: int) -> Tensor:
     """Weight of each frequency band, ``(1 - cos(pi clamp(band_alpha - k, 0, 1))) / 2``.
@@ -20,6 +25,11 @@ def band_weights(band_alpha: float, bands: int) -> Tensor:
     """
     position = torch.clamp(band_alpha - torch.arange(bands, dtype=torch.float64), 0.0, 1.0)
     return 0.5 * (1.0 - torch.cos(math.pi * position))
+
+
+def most_bands(dtype: torch.dtype) -> int:
+    """How many bands coordinates of this type have digits for: 19 for float32, 3 for bfloat16."""
+    return max(1 - _DIGITS_LEFT - round(math.log2(torch.finfo(dtype).eps)), 0)
 
 
 class FrequencyEncoding(nn.Module):
@@ -44,7 +54,16 @@ class FrequencyEncoding(nn.Module):
         self.weights.copy_(band_weights(band_alpha, self.bands))
 
     def forward(self, x: Tensor) -> Tensor:
-        """(..., D) -> (..., D (1 + 2 bands))."""
+        """(..., D) -> (..., D (1 + 2 bands)).
+
+        Raises InputError for coordinates too short for the highest band: its phase would be noise.
+        """
+        if self.bands > most_bands(x.dtype):
+            raise InputError(
+                f"{self.bands} bands need coordinates that carry them",
+                f"{x.dtype}, good for {most_bands(x.dtype)}",
+                "Encode float32 coordinates; autocast leaves them as they are.",
+            )
         angles = x[..., None] * self.frequencies
         waves = torch.cat([torch.sin(angles), torch.cos(angles)], -1)
         weighted = waves * torch.cat([self.weights, self.weights])

@@ -62,6 +62,9 @@ def transform_points(twist: Tensor, points: Tensor) -> Tensor:
 
     Source: Modern Robotics, eqs. 3.51 and 3.88; MoCo-Flow sec. 3.2 (SE(3) motion fields).
     """
+    # Autocast makes twists shorter than points: a rotation needs the digits of the longer type.
+    wide = torch.promote_types(torch.promote_types(twist.dtype, points.dtype), torch.float32)
+    twist, points = twist.to(wide), points.to(wide)
     omega, v = twist[..., :3], twist[..., 3:]
     a, b, c = _coefficients((omega * omega).sum(-1, keepdim=True))
     turned = _cross(omega, points)

@@ -37,5 +37,7 @@ def global_consensus(
 
 
 def _mean_l1(difference: Tensor, known: Tensor) -> Tensor:
-    summed = (difference.abs().sum(-1) * known).sum()
-    return summed / known.sum().clamp_min(1).to(torch.promote_types(summed.dtype, torch.float32))
+    # Half precision holds neither the sum of many metres nor the count of many points.
+    wide = torch.promote_types(difference.dtype, torch.float32)
+    summed = (difference.abs().sum(-1, dtype=wide) * known).sum()
+    return summed / known.sum().clamp_min(1).to(wide)

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.errors import InputError
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.geometry.rays import Rays, pixel_rays
 from mocoflow_core.rendering.pixels import shell_pixels
@@ -33,7 +34,7 @@ class TrainingPixels:
     """The training frames of a clip and, per frame, the pixels that the shell projects to.
 
     Pixels that the shell does not reach show the background whatever is learned, so no ray goes
-    there.
+    there. Raises InputError where the body is in sight of no frame.
     """
 
     def __init__(self, clip: Clip, body: BodyMotion, shell_width_m: float) -> None:
@@ -52,6 +53,23 @@ class TrainingPixels:
         self.starts = torch.cumsum(self.counts, 0) - self.counts
         # A person who has left the picture leaves a frame without candidates.
         self.in_sight = self.counts.nonzero()[:, 0]
+        self.numbers = clip.frame_indices[rows]
+        if not len(self.in_sight):
+            raise InputError(
+                f"the body must be in sight of {clip.camera.name} in a training frame",
+                f"one beside or behind the camera in all {len(rows)}",
+                "Check the meshes' coordinates and the camera's R, t and K.",
+            )
+
+    def problem(self, batch: Batch) -> str | None:
+        """Which frame brings colours or rays that are not finite; None if all is well."""
+        numbers = (batch.rgb, batch.rays.origins, batch.rays.directions)
+        stretch = torch.stack([batch.near, batch.far], -1)
+        bad = ~torch.isfinite(torch.cat([*numbers, stretch], -1)).all(-1)
+        if not bad.any():
+            return None
+        frame = self.numbers[int(batch.row[bad][0])]
+        return f"frame {frame} has colours or rays that are not finite"
 
     def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
         """Rays of a few frames, uniform over frames and over each frame's candidate pixels."""

@@ -1,15 +1,33 @@
-"""No NaN survives: a bad step is refused, the last good state restored, the rate halved."""
+"""No NaN survives and no run goes astray unseen.
+
+A bad step is refused, the last good state restored, the rate halved.
+"""
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 import torch
 from torch import Tensor, nn
 
+# Losses vary with the rays that are drawn. What counts is the median of the last steps, at least so
+# many of them and so many rays.
+_RECENT_STEPS = 10
+_FEWEST_STEPS = 5
+_RECENT_RAYS = 1000
+# A rise above the best by the first factor is met at once, by the second when a state is to be
+# kept: a scene in which nothing is left to see costs two to four times the losses of its start.
+_ASTRAY = 4.0
+_WORSE = 2.0
+# Below this (30 dB of a colour) a rise is no harm.
+_SMALL_LOSS = 1e-3
+
 
 class TrainingDiverged(RuntimeError):
-    """The optimisation met more non-finite steps than it may recover from."""
+    """The optimisation met more bad steps than it may recover from."""
 
 
 @dataclass(frozen=True)
@@ -23,35 +41,87 @@ class GuardEvent:
 class Guard:
     """Watches losses, gradients and weights; keeps the last good state to go back to."""
 
-    def __init__(self, model: nn.Module, optimiser: torch.optim.Optimizer, allowed: int) -> None:
+    def __init__(
+        self,
+        model: nn.Module,
+        optimiser: torch.optim.Optimizer,
+        allowed: int,
+        rays: int = _RECENT_RAYS,
+    ) -> None:
+        """Args: allowed events before the run stops, rays of one step."""
         self.model = model
         self.optimiser = optimiser
         self.allowed = allowed
         self.events: list[GuardEvent] = []
         self.rate_scale = 1.0
-        bad = self._not_finite()
+        self._recent: deque[float] = deque(maxlen=max(_RECENT_STEPS, -(-_RECENT_RAYS // rays)))
+        self._best = math.inf
+        bad = self._not_finite() or self._moment_not_finite()
         if bad is not None:
             raise TrainingDiverged(
                 f"cannot start: {bad} is not finite. Remove the checkpoint and start again."
             )
         self.remember()
 
+    def expect(self, loss: float) -> None:
+        """What the losses sum to at the start, over many rays."""
+        self._best = loss if math.isfinite(loss) else math.inf
+
     def remember(self) -> None:
         """Take the present state as good, unless it is not finite."""
-        if self._not_finite() is None:
+        if self._not_finite() is None and self._moment_not_finite() is None:
             self._weights = [value.detach().clone() for value in self.model.parameters()]
             self._moments = {
                 parameter: {name: _copied(value) for name, value in state.items()}
                 for parameter, state in self.optimiser.state.items()
             }
 
+    def settle(self) -> str | None:
+        """Remember the present state if the last steps prove it good; else their decline."""
+        enough = len(self._recent) == self._recent.maxlen
+        decline = self.decline() if enough else None
+        if enough and decline is None:
+            self._best = min(self._best, median(self._recent))
+            self.remember()
+        return decline
+
+    def decline(self) -> str | None:
+        """Whether the last steps are worse than the best ones, or too few since a refusal."""
+        if len(self._recent) >= _FEWEST_STEPS:
+            return self._risen(_WORSE)
+        if self.events and self._recent:
+            return f"only {len(self._recent)} steps since the last refusal: too few to trust"
+        return None
+
     def problem(self, terms: dict[str, Tensor]) -> str | None:
-        """Name of the first non-finite loss, weight or gradient; None if all is well."""
+        """What is wrong with a step, in words; None if all is well.
+
+        The first loss, weight or gradient that is not finite, or losses that have risen far above
+        the best ones. Without terms the state alone is looked at.
+        """
         for name, value in terms.items():
             if not torch.isfinite(value.detach()):
                 return f"loss {name} is {value.item()}"
         bad = self._not_finite()
-        return None if bad is None else f"{bad} is not finite"
+        if bad is not None:
+            return f"{bad} is not finite"
+        if terms:
+            self._recent.append(sum(float(value.detach()) for value in terms.values()))
+        return self._risen(_ASTRAY) if len(self._recent) == self._recent.maxlen else None
+
+    def _risen(self, factor: float) -> str | None:
+        usual = median(self._recent) if self._recent else 0.0
+        if usual <= factor * max(self._best, _SMALL_LOSS):
+            return None
+        return f"the losses have risen from {self._best:.3g} to {usual:.3g}: rates too high?"
+
+    def _moment_not_finite(self) -> str | None:
+        """The first moment of the optimiser that is not finite."""
+        for name, parameter in self.model.named_parameters():
+            for part, value in self.optimiser.state.get(parameter, {}).items():
+                if isinstance(value, Tensor) and not torch.isfinite(value).all():
+                    return f"the optimiser's {part} of {name}"
+        return None
 
     def _not_finite(self) -> str | None:
         """The first weight or gradient that is not finite."""
@@ -87,6 +157,7 @@ class Guard:
             for owner, moments in self._moments.items():
                 self.optimiser.state[owner] = {n: _copied(v) for n, v in moments.items()}
         self.rate_scale *= 0.5
+        self._recent.clear()
 
 
 def _copied(value: object) -> object:

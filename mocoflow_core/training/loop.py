@@ -26,6 +26,7 @@ from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_fac
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
+_START_RAYS = 1024  # that tell how large the losses are at the start
 _PROBE_STEPS = 20  # steps that measure the speed before a budget fixes their number
 
 
@@ -61,7 +62,8 @@ class TrainingRun:
         else:
             self.progress = restored
             self.progress.tries += 1
-        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS)
+        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, schedule.rays)
+        self.guard.expect(self._start_loss())
         self.guard.events = self.progress.events
         self.guard.rate_scale = self.progress.rate_scale
 
@@ -97,6 +99,7 @@ class TrainingRun:
             if self.progress.step % 10 == 0:
                 done = self.progress.step / self.progress.steps
                 self.report(done, f"step {self.progress.step} of {self.progress.steps}")
+        self._go_back_if_bad()
         self._snapshot()
 
     def _try_out(self) -> None:
@@ -105,6 +108,14 @@ class TrainingRun:
         batch = self.pixels.batch(self.schedule.rays, self.schedule.frames_per_step, generator)
         torch.stack(list(self.objective(batch, generator).values())).sum().backward()
         self.optimiser.zero_grad(set_to_none=True)
+
+    @torch.no_grad()
+    def _start_loss(self) -> float:
+        """What the losses sum to before anything is learned, over enough rays to rely on."""
+        generator = torch.Generator().manual_seed(0)
+        rays = max(self.schedule.rays, _START_RAYS)
+        batch = self.pixels.batch(rays, self.schedule.frames_per_step, generator)
+        return float(torch.stack(list(self.objective(batch, generator).values())).sum())
 
     def _step(self, step: int) -> None:
         schedule, steps = self.schedule, self.progress.steps
@@ -118,16 +129,26 @@ class TrainingRun:
         terms = self.objective(batch, self.generator)
         self.optimiser.zero_grad(set_to_none=True)
         torch.stack(list(terms.values())).sum().backward()
-        problem = self.guard.problem(terms)
-        if problem is not None:
-            self.guard.refuse(step, problem)
-            self.progress.rate_scale = self.guard.rate_scale
-            return
+        problem = self.pixels.problem(batch) or self.guard.problem(terms)
         # These weights have just given finite losses and gradients; the next ones are unknown.
-        if step % _REMEMBER_EVERY == 0:
-            self.guard.remember()
+        if problem is None and step % _REMEMBER_EVERY == 0:
+            problem = self.guard.settle()
+        if problem is not None:
+            self._refuse(problem)
+            return
         self.optimiser.step()
         self._losses.append({name: float(value.detach()) for name, value in terms.items()})
+
+    def _refuse(self, problem: str) -> None:
+        self.guard.refuse(self.progress.step, problem)
+        self.progress.rate_scale = self.guard.rate_scale
+
+    def _go_back_if_bad(self) -> None:
+        """The last update has not been seen by a step: nothing bad may be kept."""
+        self.optimiser.zero_grad(set_to_none=True)
+        problem = self.guard.problem({}) or self.guard.decline()
+        if problem is not None:
+            self._refuse(problem)
 
     def _fit_budget(self) -> None:
         """Shorten the schedule so that the training clock ends within the budget."""
@@ -139,6 +160,8 @@ class TrainingRun:
         self.progress.steps = min(self.progress.steps, possible)
 
     def _snapshot(self) -> None:
+        if self.guard.problem({}) is not None:
+            return  # the next step refuses it
         folder = self.workspace / "snapshots"
         folder.mkdir(exist_ok=True)
         step = self.progress.step
@@ -152,6 +175,8 @@ class TrainingRun:
         index.write_text(json.dumps(entries))
 
     def _save(self) -> None:
+        if self.guard.problem({}) is not None:
+            return  # the next step refuses it
         save_checkpoint(self.workspace, self.progress, self.field, self.optimiser, self.generator)
 
 

@@ -120,7 +120,8 @@ def test_masks_cut_by_the_border_count_little(masks):
     cut[3] = np.roll(cut[3], 128 - 60, axis=0)
     located = locate_body(clip_of(cut), root_centred(), LocationConfig())
     assert located.confidence[3] < 0.05 * np.median(located.confidence)
-    assert errors_m(located)[0][3] < 0.1
+    # The mask shows a body that is cut and 68 pixels, 1.4 m, lower; a tenth of that is believed.
+    assert errors_m(located)[0][3] < 0.14
     assert f"1 of {FRAMES} masks" in located.warnings[0]
 
 

@@ -12,7 +12,12 @@ ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "deployments" / "prefect.yaml").read_text())["deployments"]
 
 
-FLOWS = {"full": "mocoflow", "fast": "mocoflow", "synthetic": "benchmark"}
+FLOWS = {
+    "full": "mocoflow",
+    "fast": "mocoflow",
+    "synthetic": "benchmark",
+    "nightly": "stability",
+}
 
 
 def test_all_deployments_are_there():

@@ -6,7 +6,11 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
+
 from mocoflow_core.artifacts import SceneArtifact
+from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.io.content_key import digest_file
 from mocoflow_core.io.run_folder import read_run
 from mocoflow_core.io.store import Store
@@ -94,3 +98,16 @@ def test_a_deleted_payload_is_rebuilt_with_the_same_parameters(
 def _model(store, record):
     artifact = store.find(SceneArtifact, record.stage("optimise_scene").key)
     return store.folder(artifact) / "model.safetensors"
+
+
+def test_a_black_frame_and_a_frozen_mesh_are_named_in_the_record(reconstruct, toy_scene, tmp_path):
+    spoilt = shutil.copytree(toy_scene, tmp_path / "spoilt")
+    black = spoilt / "frames" / "cam00" / "000005.png"
+    Image.fromarray(np.zeros((32, 32, 3), np.uint8)).save(black)
+    meshes = MeshSequence.load(spoilt / "meshes.npz")
+    meshes.vertices[1:5] = meshes.vertices[1]
+    meshes.save(spoilt / "meshes.npz")
+    record = reconstruct(spoilt, tmp_path / "out")
+    assert any("frame 5 of cam00 left out" in words for words in record.warnings)
+    assert any("does not move in 4 frames (1-4)" in words for words in record.warnings)
+    assert "left out: more than" in (tmp_path / "out" / "report.html").read_text()

@@ -156,3 +156,13 @@ def test_huge_translations_do_not_disturb_the_rotation():
     expected = exponential(values)
     assert rotation.numpy() == pytest.approx(expected[:3, :3], abs=1e-14)
     assert translation.numpy() == pytest.approx(expected[:3, 3], rel=1e-13)
+
+
+@pytest.mark.parametrize("short", [torch.bfloat16, torch.float16])
+def test_a_twist_shorter_than_its_points_moves_them_with_the_points_digits(short):
+    twisted = twist(1.0).to(short)
+    found = transform_points(twisted, POINT.float())
+    assert found.dtype == torch.float32
+    # The twist is what it is; nothing is lost besides.
+    expected = transform_points(twisted.double(), POINT.float().double())
+    assert (found.double() - expected).abs().max() < 8 * torch.finfo(torch.float32).eps

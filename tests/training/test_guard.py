@@ -149,3 +149,109 @@ def test_after_the_allowed_number_of_events_it_stops_and_says_what_and_where():
     assert "canonical.tables.0" in text
     assert "schedule.rate" in text
     assert len(run.guard.events) == 4
+
+
+def spoil(run: Run) -> None:
+    """A moment of the optimiser that is no number."""
+    run.optimiser.state[run.model[0].weight]["exp_avg"][0, 0] = torch.nan
+
+
+def test_a_state_whose_moments_are_not_finite_is_never_remembered():
+    run = Run()
+    run.steps(2)
+    run.guard.remember()
+    good = run.state()
+    run.steps(1)
+    spoil(run)
+    run.guard.remember()
+    run.guard.refuse(3, "x")
+    assert same(run.state(), good)
+    assert all(torch.isfinite(s["exp_avg"]).all() for s in run.optimiser.state.values())
+
+
+def test_a_start_with_moments_that_are_not_finite_is_refused_in_words():
+    run = Run()
+    run.steps(1)
+    spoil(run)
+    with pytest.raises(TrainingDiverged, match=r"exp_avg of 0\.weight"):
+        Guard(run.model, run.optimiser, 3)
+
+
+def look(run: Run, loss: float, steps: int) -> str | None:
+    """The last thing the guard says of so many steps of one loss."""
+    for _ in range(steps):
+        said = run.guard.problem({"photometric": torch.tensor(loss)})
+    return said
+
+
+def test_losses_that_rise_far_above_the_expected_are_named_after_some_steps():
+    run = Run()
+    run.guard.expect(0.02)
+    assert look(run, 0.1, 9) is None
+    assert "risen from 0.02 to 0.1" in look(run, 0.1, 1)
+
+
+def test_an_outlier_is_no_rise():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.02, 6)
+    assert look(run, 50.0, 4) is None
+
+
+def test_a_small_loss_may_rise():
+    run = Run()
+    run.guard.expect(1e-6)
+    assert look(run, 1e-3, 20) is None
+
+
+def test_few_rays_are_looked_at_for_longer():
+    run = Run()
+    guard = Guard(run.model, run.optimiser, 3, rays=50)
+    guard.expect(0.02)
+    said = [guard.problem({"photometric": torch.tensor(0.5)}) for _ in range(20)]
+    assert said[:-1] == [None] * 19
+    assert said[-1] is not None
+
+
+def test_a_state_is_kept_only_where_the_last_steps_prove_it_good():
+    run = Run()
+    run.guard.expect(0.02)
+    good = run.state()
+    run.steps(1)
+    assert run.guard.settle() is None  # nothing is known of it
+    look(run, 0.05, 10)
+    assert "risen" in run.guard.settle()
+    run.guard.refuse(11, "x")
+    assert same(run.state(), good)
+    run.steps(1)
+    better = run.state()
+    look(run, 0.01, 10)
+    assert run.guard.settle() is None
+    run.steps(1)
+    run.guard.refuse(22, "x")
+    assert same(run.state(), better)
+
+
+def test_after_a_refusal_old_losses_are_forgotten_and_a_few_new_ones_prove_nothing():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.5, 10)
+    run.guard.refuse(10, "x")
+    assert run.guard.decline() is None  # the state is the good one
+    assert look(run, 0.02, 1) is None
+    assert "too few" in run.guard.decline()
+    look(run, 0.02, 4)
+    assert run.guard.decline() is None
+
+
+def test_a_run_of_a_step_or_two_without_any_refusal_is_not_judged():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.5, 2)
+    assert run.guard.decline() is None
+
+
+def test_a_start_that_is_not_finite_expects_nothing():
+    run = Run()
+    run.guard.expect(float("nan"))
+    assert look(run, 5.0, 20) is None

@@ -10,7 +10,9 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
+from mocoflow_core.errors import InputError
 from mocoflow_core.losses.weights import LossConfig
+from mocoflow_core.training import loop
 from mocoflow_core.training.checkpoint import read_metadata
 from mocoflow_core.training.guard import TrainingDiverged
 from mocoflow_core.training.optimise_scene import Learned
@@ -210,3 +212,36 @@ def test_a_plant_in_a_checkpoint_is_refused_in_words(prepared: Prepared, tmp_pat
     save_file(tensors, file, metadata=metadata)
     with pytest.raises(TrainingDiverged, match=r"canonical\.tables\.0"):
         train(prepared, tmp_path, schedule=CAREFUL)
+
+
+def test_weights_that_the_very_last_update_spoils_are_not_kept(prepared, tmp_path, monkeypatch):
+    made = loop._optimiser
+
+    def spoiling(field, schedule):
+        optimiser = made(field, schedule)
+        update, steps = optimiser.step, iter(range(1, 1000))
+
+        def step():
+            update()
+            if next(steps) == SCHEDULE.joint_steps:
+                with torch.no_grad():
+                    field.canonical.tables[0][0, 0] = torch.nan
+
+        optimiser.step = step
+        return optimiser
+
+    monkeypatch.setattr(loop, "_optimiser", spoiling)
+    result = train(prepared, tmp_path)
+    assert all(torch.isfinite(value).all() for value in parameters(tmp_path).values())
+    assert [event["step"] for event in result.events] == [SCHEDULE.joint_steps]
+
+
+def test_rates_that_lead_astray_are_an_event(prepared, tmp_path):
+    assert train(prepared, tmp_path, schedule=with_rate(0.5)).events
+
+
+def test_a_body_that_no_frame_shows_is_bad_input(prepared, tmp_path):
+    camera = prepared.clip.camera
+    aside = replace(camera, t=camera.t + np.array([50.0, 0.0, 0.0]))
+    with pytest.raises(InputError, match="in sight"):
+        train(replace(prepared, clip=replace(prepared.clip, camera=aside)), tmp_path)
