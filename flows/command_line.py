@@ -40,6 +40,10 @@ def reconstruct(
     budget: Annotated[
         float | None, typer.Option(help="Seconds of the training clock.", min=1.0)
     ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="train_psnr=DB", help="Stop at this score of held-out train pixels."),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
@@ -56,6 +60,7 @@ def reconstruct(
         meshes=meshes,
         seed=seed,
         budget_s=budget,
+        until=until,
         settings=tuple(settings or ()),
         store_url=store,
     )
@@ -73,6 +78,7 @@ def reconstruct(
             meshes=meshes,
             seed=seed,
             budget_s=budget,
+            until=until,
             settings=request.settings,
             store=store,
         )

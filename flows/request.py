@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.stopping import read_target
 from flows.user_folders import cache_folder
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.errors import InputError
@@ -38,6 +39,7 @@ class Request(BaseModel):
     meshes: Path | None = None
     seed: int = 0
     budget_s: float | None = None
+    until: str | None = None
     settings: tuple[str, ...] = ()
     store_url: str | None = None
 
@@ -47,13 +49,14 @@ class Request(BaseModel):
 
     @cached_property
     def configuration(self) -> Configuration:
-        """The preset with the settings and the budget applied."""
+        """The preset with the settings, the budget and the score to reach applied."""
         if self.preset not in PRESETS:
             raise InputError(
                 f"--preset must be one of {', '.join(PRESETS)}", repr(self.preset), "Choose one."
             )
         budget = () if self.budget_s is None else (f"schedule.budget_s={self.budget_s}",)
-        return with_settings(PRESETS[self.preset](), (*self.settings, *budget))
+        until = () if self.until is None else (read_target(self.until),)
+        return with_settings(PRESETS[self.preset](), (*self.settings, *budget, *until))
 
     @cached_property
     def store(self) -> Store:

@@ -21,9 +21,10 @@ from mocoflow_core.training.clock import Seconds
 from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.optimise_scene import Learned
 from mocoflow_core.training.schedule import ScheduleConfig
+from tasks.growing_curve import GrowingCurve
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Pixels are held out for train_psnr; schedules in shares.
 
 
 @stage(SceneArtifact, ALGORITHM_VERSION, resumes=True)
@@ -75,13 +76,20 @@ def optimise_scene(
         spent,
         work.folder,
         work.progress,
+        GrowingCurve(spent).show,
     )
+    work.leave_out(result.evaluation_wall_s, result.evaluation_cpu_s)
     return {
         "steps": result.steps,
+        "rays": result.rays,
         "threads": result.threads,
         "tries": result.tries,
         "events": [str(event) for event in result.events],
         "losses": result.losses,
+        "train_psnr": result.train_psnr,
+        "held_out": result.held_out,
+        "warnings": list(result.warnings),
+        "machine": before.values["machine"],
         "before_wall_s": spent.wall,
         "before_cpu_s": spent.cpu,
     }

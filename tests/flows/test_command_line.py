@@ -133,6 +133,25 @@ def test_a_preset_that_does_not_exist_is_refused(refuse, toy_scene, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("condition", "because"),
+    [
+        ("30", "train_psnr=DECIBELS"),
+        ("train_psnr", "train_psnr=DECIBELS"),
+        ("psnr=30", "only pixels of the train camera"),
+        ("train_psnr=much", "decibels above 0"),
+        ("train_psnr=-3", "decibels above 0"),
+        ("train_psnr=nan", "decibels above 0"),
+        ("train_psnr=300", "schedule.until_train_psnr"),
+    ],
+)
+def test_a_score_that_cannot_be_reached_is_refused(refuse, toy_scene, tmp_path, condition, because):
+    refuse(
+        *("reconstruct", toy_scene, "--out", tmp_path / "out", "--until", condition),
+        because=because,
+    )
+
+
 def test_a_matrix_that_is_no_rotation_is_refused(refuse, scene, describe, tmp_path):
     describe(lambda d: d["cameras"]["cam00"]["R"][0].reverse())
     refuse("reconstruct", scene, "--out", tmp_path / "out", because="rotation")
