@@ -16,6 +16,7 @@ from mocoflow_core.artifacts import (
     PlanArtifact,
     RepairArtifact,
 )
+from mocoflow_core.capture.extract import ClipNeeds
 from tasks.extract_clip import extract_clip
 from tasks.fit_motion import fit_motion
 from tasks.ingest_meshes import ingest_meshes
@@ -30,9 +31,9 @@ from tasks.repair_body import repair_body
 class Preparation:
     """What the optimisation starts from, in the order in which it was made."""
 
-    clip: ClipArtifact
     given: MeshArtifact
     inspection: InspectionArtifact
+    clip: ClipArtifact
     bodies: MeshArtifact | LocationArtifact
     repaired: RepairArtifact
     plan: PlanArtifact
@@ -47,14 +48,19 @@ class Preparation:
 def prepare(request: Request) -> Preparation:
     """Run the stages before the optimisation, or find them in the store."""
     where, chosen = request.store, request.configuration
-    clip = extract_clip(where, request.recording, chosen.capture)
     given = ingest_meshes(where, request.recording, request.bodies)
     inspection = inspect_scene(where, request.recording, given, chosen.plan)
+    needs = ClipNeeds(
+        background=inspection.holds("background_extraction"),
+        masks=inspection.holds("mask_segmentation"),
+        repeated_frames=chosen.plan.repeated_frames == "on",
+    )
+    clip = extract_clip(where, request.recording, chosen.capture, needs)
     bodies = given
     if inspection.holds("location_search"):
         bodies = locate_body(where, clip, given, chosen.location)
-    repaired = repair_body(where, clip, bodies, chosen.repair)
+    repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
     plan = plan_scene(where, clip, repaired, inspection, chosen.plan)
     density = pretrain_density(where, repaired, plan, chosen.density)
     motion = fit_motion(where, clip, repaired, plan, density, chosen.motion)
-    return Preparation(clip, given, inspection, bodies, repaired, plan, density, motion)
+    return Preparation(given, inspection, clip, bodies, repaired, plan, density, motion)

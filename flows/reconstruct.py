@@ -8,6 +8,7 @@ from typing import Literal
 
 from prefect import flow
 
+from flows.plan_table import show_plan
 from flows.preparation import prepare
 from flows.request import Request
 from flows.run_facts import describe_run, records, show_in_prefect
@@ -50,7 +51,6 @@ def reconstruct(
     start, machine = perf_counter(), describe_machine()
     request = Request(
         scene_path=scene,
-        out=out,
         preset=preset,
         meshes=meshes,
         seed=seed,
@@ -59,10 +59,11 @@ def reconstruct(
         settings=settings,
         store_url=store,
     )
-    folder = request.claim()
+    folder = request.claim(out)
     where, chosen = request.store, request.configuration
 
     prepared = prepare(request)
+    show_plan(request, prepared.plan)
     clip, plan, bodies = prepared.clip, prepared.plan, prepared.bodies
     trained = optimise_scene(
         where,

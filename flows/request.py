@@ -29,12 +29,11 @@ def open_users_store(url: str | None) -> Store:
 
 
 class Request(BaseModel):
-    """The parameters of a reconstruction; the flow and the command line share them."""
+    """The parameters of a run; the flows and the command line share them."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     scene_path: Path
-    out: Path
     preset: str = "fast"
     meshes: Path | None = None
     seed: int = 0
@@ -79,8 +78,8 @@ class Request(BaseModel):
         """The evaluation cameras' files and the truth."""
         return evaluation_source(self.scene)
 
-    def claim(self) -> RunFolder:
-        """Take the output folder. Raises InputError when it holds anything else."""
+    def claim(self, out: Path) -> RunFolder:
+        """Take a folder for the results. Raises InputError when it holds anything else."""
         begun = RunRecord(
             request=self._key(),
             scene=self.scene.description.name,
@@ -92,7 +91,7 @@ class Request(BaseModel):
             license=self.scene.description.license,
             attribution=self.scene.description.attribution,
         )
-        return RunFolder.claim(self.out, begun)
+        return RunFolder.claim(out, begun)
 
     def _key(self) -> str:
         inputs = {

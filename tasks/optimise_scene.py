@@ -49,6 +49,8 @@ def optimise_scene(
     """
     seen = Clip.load(work.open(clip))
     decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
+    canonical = canonical.model_copy(update={"finest_m": decided.no_finer(canonical.finest_m)})
+    sampling = sampling.model_copy(update={"step_m": decided.no_finer(sampling.step_m)})
     spent = Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
     result = training.optimise_scene(
         seen,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from mocoflow_core.artifacts import ClipArtifact, LocationArtifact, MeshArtifact, RepairArtifact
-from mocoflow_core.body.mask_fit import MaskFitConfig, fit_to_masks
+from mocoflow_core.body.mask_fit import MaskFitConfig
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.planning.decision import Force
+from mocoflow_core.planning.repair import repair_where_needed
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Says why.
 
 
 @stage(RepairArtifact, ALGORITHM_VERSION)
@@ -17,12 +19,16 @@ def repair_body(
     clip: ClipArtifact,
     bodies: MeshArtifact | LocationArtifact,
     repair: MaskFitConfig,
+    force: Force,
 ) -> Summary:
     """Joints and place corrected before anything is learned; an estimate that agrees is kept.
 
-    Output: ``meshes.npz`` in world metres. About a second, or 0.2 s a frame where it is needed.
+    Output: ``meshes.npz`` in world metres, ``decision.json``. About a second, or 0.2 s a frame
+    where it is needed.
     """
     given = MeshSequence.load(work.open(bodies) / "meshes.npz")
-    fitted = fit_to_masks(Clip.load(work.open(clip)), given, repair, work.progress)
-    fitted.save(work.folder / "meshes.npz")
-    return {"repaired": fitted is not given}
+    seen = Clip.load(work.open(clip))
+    meshes, decision = repair_where_needed(seen, given, repair, force, work.progress)
+    meshes.save(work.folder / "meshes.npz")
+    (work.folder / "decision.json").write_text(decision.model_dump_json(indent=1))
+    return {"repaired": decision.needed}

@@ -79,7 +79,7 @@ def prepare(scene: Path) -> Prepared:
         inner_depth_m=SAMPLING.inner_depth_m,
         step_m=SAMPLING.step_m,
     )
-    motion = fit_motion(clip, meshes, density, SHELL_M, MOTION)
+    motion = fit_motion(clip, meshes, density, SHELL_M, True, MOTION)
     return Prepared(clip, meshes, density, motion, shape)
 
 

@@ -66,8 +66,41 @@ class MaskFitConfig(ConfigurationPart):
     rate: float = Field(0.15, gt=0, description="Adam's first rate, in usual errors; falls to 0.")
 
 
+def outlines_apart(clip: Clip, meshes: MeshSequence, configuration: MaskFitConfig) -> float:
+    """How far the body's outline is from the masks', in pixels; nan where no mask shows it.
+
+    Three quarters of the outline are nearer. Clothes push the whole outline outward, so a distance
+    that all points share says nothing and is taken off.
+    """
+    frames = clip.frame_indices[_shown(clip)]
+    outlines = _mask_outlines(clip, configuration)
+    topology, focal = EdgeTopology.of(meshes.faces), _focal(clip.camera)
+    off = [np.zeros(0)]
+    for vertices, mask in zip(meshes.at(frames).vertices, outlines, strict=True):
+        body = topology.outline(vertices, clip.camera)
+        pairs = _pairs(body, mask, focal, configuration)
+        apart = body.pixels[pairs.body] - mask.pixels[pairs.mask]
+        off.append((apart * mask.normals[pairs.mask]).sum(-1))
+    distances = np.concatenate(off)
+    if not len(distances):
+        return float("nan")
+    return float(np.percentile(np.abs(distances - np.median(distances)), 75))
+
+
+def expected_share(apart_px: float, configuration: MaskFitConfig) -> float:
+    """How large errors are to be expected, in usual ones: 0 where the estimate fits already."""
+    if np.isnan(apart_px):
+        return 0.0
+    ramp = configuration.apart_px - configuration.agreeing_px
+    return float(np.clip((apart_px - configuration.agreeing_px) / ramp, 0.0, 1.0))
+
+
 def fit_to_masks(
-    clip: Clip, meshes: MeshSequence, configuration: MaskFitConfig, progress: Progress
+    clip: Clip,
+    meshes: MeshSequence,
+    expected: float,
+    configuration: MaskFitConfig,
+    progress: Progress,
 ) -> MeshSequence:
     """The meshes with their joints and place corrected towards the masks of the training frames.
 
@@ -78,24 +111,15 @@ def fit_to_masks(
     Args:
         clip: of the camera trained on.
         meshes: world metres; holds every frame of the clip.
+        expected: size of the errors, in usual ones, above 0.
     """
-    training = ~clip.held_out & clip.has_mask
-    training &= clip.masks.reshape(len(clip.masks), -1).any(axis=1)
-    if not training.any():
+    frames = clip.frame_indices[_shown(clip)]
+    if not len(frames):
         return meshes
-    frames = clip.frame_indices[training]
-    outlines = [MaskOutline.of(mask, configuration.outline_points) for mask in clip.masks[training]]
+    outlines = _mask_outlines(clip, configuration)
     skeleton = articulate(meshes.vertices, meshes.faces, configuration.parts, configuration.blend_m)
     rows = np.searchsorted(meshes.frame_indices, frames)
     topology = EdgeTopology.of(meshes.faces)
-    expected = _expected_share(
-        [topology.outline(vertices, clip.camera) for vertices in meshes.vertices[rows]],
-        outlines,
-        clip.camera,
-        configuration,
-    )
-    if expected == 0:
-        return meshes
     correction = _no_correction(skeleton, meshes, clip, frames, expected, configuration)
     # Sums over several threads differ in their last bit from run to run.
     with torch_threads(1):
@@ -103,6 +127,15 @@ def fit_to_masks(
         with torch.no_grad():
             vertices = correction.vertices(np.arange(len(meshes.vertices)))
     return replace(meshes, vertices=vertices)
+
+
+def _shown(clip: Clip) -> NDArray[np.bool_]:
+    """Training frames (T,) with a person in the mask."""
+    return ~clip.held_out & clip.has_mask & clip.masks.any(axis=(1, 2))
+
+
+def _mask_outlines(clip: Clip, configuration: MaskFitConfig) -> list[MaskOutline]:
+    return [MaskOutline.of(mask, configuration.outline_points) for mask in clip.masks[_shown(clip)]]
 
 
 def _no_correction(
@@ -128,30 +161,6 @@ def _no_correction(
         expected * configuration.root_error_m,
         configuration.clothes_m,
     )
-
-
-def _expected_share(
-    bodies: list[BodyOutline],
-    masks: list[MaskOutline],
-    camera: Camera,
-    configuration: MaskFitConfig,
-) -> float:
-    """How large errors are to be expected, in usual ones: 0 where the estimate fits already.
-
-    Clothes push the whole outline outward, so a distance that all points share says nothing.
-    """
-    focal = _focal(camera)
-    off = [np.zeros(0)]
-    for body, mask in zip(bodies, masks, strict=True):
-        pairs = _pairs(body, mask, focal, configuration)
-        apart = body.pixels[pairs.body] - mask.pixels[pairs.mask]
-        off.append((apart * mask.normals[pairs.mask]).sum(-1))
-    distances = np.concatenate(off)
-    if not len(distances):
-        return 0.0
-    apart_px = float(np.percentile(np.abs(distances - np.median(distances)), 75))
-    ramp = configuration.apart_px - configuration.agreeing_px
-    return float(np.clip((apart_px - configuration.agreeing_px) / ramp, 0.0, 1.0))
 
 
 def _focal(camera: Camera) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mocoflow_core.body.mask_fit import MaskFitConfig, fit_to_masks
+from mocoflow_core.body.mask_fit import MaskFitConfig, expected_share, fit_to_masks, outlines_apart
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.clip import Clip
@@ -51,7 +51,10 @@ def filmed(meshes: MeshSequence) -> Clip:
 
 
 def fitted(clip: Clip, meshes: MeshSequence) -> np.ndarray:
-    return fit_to_masks(clip, meshes, CONFIGURATION, lambda fraction, text: None).vertices
+    expected = expected_share(outlines_apart(clip, meshes, CONFIGURATION), CONFIGURATION)
+    if expected == 0:
+        return meshes.vertices
+    return fit_to_masks(clip, meshes, expected, CONFIGURATION, lambda fraction, text: None).vertices
 
 
 @pytest.fixture(scope="module")

@@ -79,7 +79,7 @@ def test_a_score_that_ends_a_run_is_not_of_another_camera(scene, toy_scene, reco
 
 def test_what_the_metrics_read_does_change(scene, toy_scene, tmp_path):
     def others(path):
-        return Request(scene_path=path, out=tmp_path / "out").others.digest
+        return Request(scene_path=path).others.digest
 
     assert others(scene) == others(toy_scene)
     replace_by_noise(scene)

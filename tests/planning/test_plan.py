@@ -8,29 +8,39 @@ import numpy as np
 import pytest
 
 from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.body.mask_fit import MaskFitConfig
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.inspection import inspect_scene
-from mocoflow_core.planning.plan import (
-    PlanConfig,
-    ScenePlan,
-    decide_evaluation,
+from mocoflow_core.planning.plan import ScenePlan, plan_scene
+from mocoflow_core.planning.preparation import (
+    decide_frames,
     decide_location,
-    plan_scene,
+    decide_preparation,
 )
+from mocoflow_core.planning.repair import repair_where_needed
+from mocoflow_core.planning.scoring import decide_evaluation
 from tests.capsule_person import capsule_person, default_recipe, edit_description, write_scene
 
 DECISIONS = [
     "background_extraction",
     "mask_segmentation",
     "location_search",
+    "repeated_frames",
+    "body_repair",
     "motion_fields",
     "motion_residual",
     "motion_consensus",
     "appearance_codes",
     "fixed_light",
+    "wide_shell",
+    "fine_detail",
 ]
+
+
+QUICK = MaskFitConfig(rounds=1, steps=1)
 
 
 def planned(folder, change_meshes=lambda meshes: meshes, change_clip=lambda clip: clip, **config):
@@ -38,7 +48,13 @@ def planned(folder, change_meshes=lambda meshes: meshes, change_clip=lambda clip
     ingested = ingest_meshes(scene)
     clip = change_clip(extract_clip(scene, CaptureConfig()))
     meshes = change_meshes(ingested.meshes)
-    return plan_scene(clip, meshes, inspect_scene(scene, ingested), PlanConfig(**config))
+    chosen = PlanConfig(**config)
+    preparation = (
+        *decide_preparation(inspect_scene(scene, ingested), chosen),
+        decide_frames(0, len(clip.frames), chosen),
+        repair_where_needed(clip, meshes, QUICK, chosen.body_repair, lambda share, text: None)[1],
+    )
+    return plan_scene(clip, meshes, preparation, chosen)
 
 
 @pytest.fixture
