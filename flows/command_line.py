@@ -100,7 +100,8 @@ def plan(
     from flows.request import Request
 
     # Bad settings are refused before anything heavy is loaded.
-    _ = Request(scene_path=scene, preset=preset, settings=tuple(settings or ())).configuration
+    request = Request(scene_path=scene, preset=preset, settings=tuple(settings or ()))
+    _ = request.configuration, request.scene
     set_environment()
     from rich.console import Console
 

@@ -46,7 +46,7 @@ def _table(part: str, decisions: list[Decision]) -> Table:
     for decision in decisions:
         row = _row(decision)
         measured = f"measured {row['evidence']}; threshold {row['threshold']}"
-        why = f"{row['reason']}\n[dim]{measured}\nsaves {row['saves']}[/dim]"
+        why = f"{row['reason']}\n[dim]{measured}\nleaving it out saves {row['saves']}[/dim]"
         table.add_row(row["name"], row["decision"], why, style="bold" if decision.needed else "")
     return table
 

@@ -17,7 +17,7 @@ from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training import optimise_scene as training
-from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.optimise_scene import Learned
 from mocoflow_core.training.schedule import ScheduleConfig
@@ -79,8 +79,8 @@ def optimise_scene(
         work.folder,
         work.progress,
         GrowingCurve(spent).show,
+        TrainingClock(paused=work.leave_out),
     )
-    work.leave_out(result.evaluation_wall_s, result.evaluation_cpu_s)
     return {
         "steps": result.steps,
         "rays": result.rays,

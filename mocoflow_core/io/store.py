@@ -107,7 +107,7 @@ class Workspace(Generic[Kind]):
         self._clock.note()
 
     def leave_out(self, wall_s: float, cpu_s: float) -> None:
-        """Seconds of all tries that were no work on the artifact."""
+        """Take off seconds that were no work on the artifact."""
         self._clock.leave_out(wall_s, cpu_s)
 
     def commit(

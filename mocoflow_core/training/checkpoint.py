@@ -29,7 +29,6 @@ class Progress:
     step: int = 0
     rate_scale: float = 1.0
     elapsed: Seconds = field(default_factory=Seconds)
-    pauses: Seconds = field(default_factory=Seconds)  # taken by evaluation
     snapshot_s: float = 0.0  # wall seconds of ``elapsed`` at the last snapshot
     reached: bool = False  # the score at which the run may stop
     events: list[GuardEvent] = field(default_factory=list)
@@ -42,7 +41,6 @@ class Progress:
     def from_json(cls, text: str) -> Progress:
         values = json.loads(text)
         values["elapsed"] = Seconds(**values["elapsed"])
-        values["pauses"] = Seconds(**values["pauses"])
         values["events"] = [GuardEvent(**event) for event in values["events"]]
         return cls(**values)
 

@@ -27,31 +27,36 @@ def now() -> Seconds:
     return Seconds(time.perf_counter(), time.process_time())
 
 
+def unheard(wall_s: float, cpu_s: float) -> None:
+    """Nobody else keeps a clock that has to leave pauses out."""
+
+
 class TrainingClock:
     """Runs from its creation on; stops while the scene is evaluated.
 
     Args:
+        paused: is told the wall and CPU seconds of each pause, when it ends.
         now: what the time is; another one than the machine's makes runs of any speed.
     """
 
-    def __init__(self, now: Callable[[], Seconds] = now) -> None:
+    def __init__(
+        self,
+        paused: Callable[[float, float], None] = unheard,
+        now: Callable[[], Seconds] = now,
+    ) -> None:
+        self._tell = paused
         self._now = now
         self._start = now()
         self._pauses = Seconds()
-        self._earlier, self._earlier_pauses = Seconds(), Seconds()
+        self._earlier = Seconds()
 
-    def go_on_from(self, elapsed: Seconds, pauses: Seconds) -> None:
-        """Add what earlier tries have used, and what they have taken for evaluation."""
-        self._earlier, self._earlier_pauses = elapsed, pauses
+    def go_on_from(self, elapsed: Seconds) -> None:
+        """Add what earlier tries have used."""
+        self._earlier = elapsed
 
     def read(self) -> Seconds:
         """Work so far, earlier tries included."""
         return self._earlier + (self._now() - self._start - self._pauses)
-
-    @property
-    def pauses(self) -> Seconds:
-        """All that was not work, earlier tries included."""
-        return self._earlier_pauses + self._pauses
 
     @contextmanager
     def paused(self) -> Iterator[None]:
@@ -60,7 +65,9 @@ class TrainingClock:
         try:
             yield
         finally:
-            self._pauses += self._now() - stopped
+            pause = self._now() - stopped
+            self._pauses += pause
+            self._tell(pause.wall, pause.cpu)
 
 
 def snapshot_due(last_s: float, now_s: float, before_s: float) -> bool:

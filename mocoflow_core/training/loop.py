@@ -63,14 +63,16 @@ class TrainingRun:
         self.score = score
         self.clock = clock
         self.generator = torch.Generator().manual_seed(seed)
-        self.optimiser = _optimiser(field, schedule)
+        # Torch loads its compiler with the first optimiser, for seconds: an import, not work.
+        with clock.paused():
+            self.optimiser = _optimiser(field, schedule)
         self._base_rates = [group["lr"] for group in self.optimiser.param_groups]
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
         self.progress = restored or self._first_start()
         if restored is not None:
             restored.tries += 1
-            clock.go_on_from(restored.elapsed, restored.pauses)
+            clock.go_on_from(restored.elapsed)
             restored.elapsed = clock.read()
         pace = plan_pace(schedule, before.wall, self.progress.started_s)
         self.pace = replace(pace, steps=self.progress.steps)
@@ -98,14 +100,19 @@ class TrainingRun:
         schedule = self.schedule
         threads = choose_threads(schedule.threads, self._try_out)
         rays = schedule.rays
-        if schedule.budget_s is not None:
+        left_s = self._left_s()
+        if left_s is not None and left_s > 0:
             with torch_threads(threads):
-                step_s = seconds_of(self._try_out)
-            left_s = schedule.budget_s - (self.before + self.clock.read()).wall
-            rays = plan_rays(schedule, left_s, step_s)
+                rays = plan_rays(schedule, left_s, seconds_of(self._try_out))
         now = self.clock.read()
         steps = plan_pace(schedule, self.before.wall, now.wall).steps
         return Progress(threads, steps, rays, started_s=now.wall, elapsed=now)
+
+    def _left_s(self) -> float | None:
+        """What remains of a budget."""
+        if self.schedule.budget_s is None:
+            return None
+        return self.schedule.budget_s - (self.before + self.clock.read()).wall
 
     def _steps(self) -> None:
         progress = self.progress
@@ -183,7 +190,6 @@ class TrainingRun:
             return None if self.score is None else self.score(self.field)
 
     def _save(self) -> None:
-        self.progress.pauses = self.clock.pauses
         save_checkpoint(self.workspace, self.progress, self.field, self.optimiser, self.generator)
 
 

@@ -48,8 +48,6 @@ class OptimisationResult:
     tries: int
     wall_s: float  # of this stage, all tries
     cpu_s: float
-    evaluation_wall_s: float  # beside it, while the clock stood still
-    evaluation_cpu_s: float
     events: list[dict[str, object]]
     losses: dict[str, float]  # mean over the last steps
     train_psnr: float | None  # dB, of the held-out pixels at the end
@@ -160,7 +158,7 @@ def _require_pixels_to_score(held_out: HeldOutPixels | None, schedule: ScheduleC
 def _result(
     run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None
 ) -> OptimisationResult:
-    progress, pauses = run.progress, run.clock.pauses
+    progress = run.progress
     train_psnr = read_snapshots(run.workspace)[-1].train_psnr
     return OptimisationResult(
         progress.step,
@@ -169,8 +167,6 @@ def _result(
         progress.tries,
         progress.elapsed.wall,
         progress.elapsed.cpu,
-        pauses.wall,
-        pauses.cpu,
         [asdict(event) for event in progress.events],
         run.recent_losses,
         train_psnr,

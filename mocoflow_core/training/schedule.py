@@ -19,8 +19,10 @@ class ScheduleConfig(ConfigurationPart):
     rate_motion: float = Field(1e-3, gt=0, description="residual motion and its codes")
     final_rate: float = Field(0.1, gt=0, le=1, description="last rate as a share of the first")
     budget_s: float | None = Field(None, gt=0, description="seconds of the training clock in all")
+    # On synthetic scenes twice the steps or twice the rays brought 0.06 dB and -0.2 dB at unseen
+    # views, four times the steps -0.2 dB: a larger budget is given back.
     longest: float = Field(
-        2.0, ge=1, description="a budget may lengthen the schedule to so many times its steps"
+        1.0, ge=1, description="a budget may lengthen the schedule to so many times its steps"
     )
     fewest_steps: int = Field(
         300, ge=1, description="a budget that leaves fewer steps than this gets fewer rays a step"

@@ -16,21 +16,7 @@ from mocoflow_core.io.run_folder import read_run
 from mocoflow_core.io.store import Store
 from mocoflow_core.metrics.curve import CLOCKED_STAGES, read_curve
 from mocoflow_core.metrics.table import read_scores
-
-STAGES = [
-    "extract_clip",
-    "ingest_meshes",
-    "inspect_scene",
-    "repair_body",
-    "plan_scene",
-    "pretrain_density",
-    "fit_motion",
-    "optimise_scene",
-    "extract_evaluation",
-    "render_views",
-    "score_views",
-    "write_report",
-]
+from tests.flows.stages import STAGES
 
 
 def test_a_run_leaves_everything_that_a_user_keeps(first_run):
@@ -141,3 +127,14 @@ def test_a_deleted_payload_is_rebuilt_with_the_same_parameters(
 def _model(store, record):
     artifact = store.find(SceneArtifact, record.stage("optimise_scene").key)
     return store.folder(artifact) / "model.safetensors"
+
+
+def test_the_run_s_page_has_the_plan_as_a_table(first_run):
+    out, _ = first_run
+    decided = json.loads((out / "plan.json").read_text())["decisions"]
+    wanted = ArtifactFilter(key=ArtifactFilterKey(any_=["plan"]))
+    (shown, *_) = get_client(sync_client=True).read_artifacts(artifact_filter=wanted)
+    rows = json.loads(shown.data)
+    names = [decision["name"].replace("_", " ") for decision in decided]
+    assert [row["name"] for row in rows] == [*names, "evaluation cameras"]
+    assert {row["part"] for row in rows} == {"preparation", "optimisation", "scoring"}

@@ -43,7 +43,6 @@ PROGRESS = Progress(
     step=20,
     rate_scale=0.25,
     elapsed=Seconds(12.5, 20.25),
-    pauses=Seconds(0.5, 0.75),
     snapshot_s=8.25,
     reached=True,
     events=[GuardEvent(7, "loss photometric is nan")],
