@@ -41,6 +41,10 @@ def reconstruct(
     budget: Annotated[
         float | None, typer.Option(help="Seconds of the training clock.", min=1.0)
     ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="train_psnr=DB", help="Stop at this score of held-out train pixels."),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
@@ -50,18 +54,19 @@ def reconstruct(
     """Reconstruct a scene: train, render, score, report."""
     from flows.request import Request
 
+    out = out or Path(f"{scene.resolve().name}-reconstructed")
     request = Request(
         scene_path=scene,
-        out=out or Path(f"{scene.resolve().name}-reconstructed"),
         preset=preset,
         meshes=meshes,
         seed=seed,
         budget_s=budget,
+        until=until,
         settings=tuple(settings or ()),
         store_url=store,
     )
-    if request.claim().is_finished():
-        typer.echo(f"Already finished: {request.out / 'report.html'}")
+    if request.claim(out).is_finished():
+        typer.echo(f"Already finished: {out / 'report.html'}")
         return
     set_environment()
     from flows.reconstruct import reconstruct as flow
@@ -69,15 +74,50 @@ def reconstruct(
     with undisturbed():
         flow(
             scene=scene,
-            out=request.out,
+            out=out,
             preset=preset,
             meshes=meshes,
             seed=seed,
             budget_s=budget,
+            until=until,
             settings=request.settings,
             store=store,
         )
-    typer.echo(f"Report: {request.out / 'report.html'}")
+    typer.echo(f"Report: {out / 'report.html'}")
+
+
+@app.command()
+def plan(
+    scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
+    preset: Annotated[str, typer.Option(help="fast or toy.")] = "fast",
+    meshes: Annotated[Path | None, typer.Option(help="Body meshes to use instead.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
+    ] = None,
+    store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+) -> None:
+    """Prepare a scene and say what it needs, before the optimisation."""
+    from flows.request import Request
+
+    # Bad settings are refused before anything heavy is loaded.
+    request = Request(scene_path=scene, preset=preset, settings=tuple(settings or ()))
+    _ = request.configuration, request.scene
+    set_environment()
+    from rich.console import Console
+
+    from flows.plan import plan as flow
+    from flows.plan_table import print_plan
+
+    with undisturbed():
+        planned = flow(
+            scene=scene,
+            preset=preset,
+            meshes=meshes,
+            settings=tuple(settings or ()),
+            store=store,
+        )
+    print_plan(planned, Console())
 
 
 @app.command(cls=ListOptions)

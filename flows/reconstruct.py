@@ -8,20 +8,15 @@ from typing import Literal
 
 from prefect import flow
 
+from flows.plan_table import show_plan
+from flows.preparation import prepare
 from flows.request import Request
 from flows.run_facts import describe_run, records, show_in_prefect
+from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunRecord
-from tasks.extract_clip import extract_clip
 from tasks.extract_evaluation import extract_evaluation
-from tasks.fit_motion import fit_motion
-from tasks.ingest_meshes import ingest_meshes
-from tasks.inspect_scene import inspect_scene
-from tasks.locate_body import locate_body
 from tasks.optimise_scene import optimise_scene
-from tasks.plan_scene import plan_scene
-from tasks.pretrain_density import pretrain_density
 from tasks.render_views import render_views
-from tasks.repair_body import repair_body
 from tasks.score_views import score_views
 from tasks.stage import Aside
 from tasks.training_clock import spent_on
@@ -36,6 +31,7 @@ def reconstruct(
     meshes: Path | None = None,
     seed: int = 0,
     budget_s: float | None = None,
+    until: str | None = None,
     settings: tuple[str, ...] = (),
     store: str | None = None,
 ) -> RunRecord:
@@ -48,40 +44,34 @@ def reconstruct(
         meshes: body meshes to use instead of the scene's own.
         seed: of everything random.
         budget_s: seconds of the training clock.
+        until: score at which the optimisation stops, such as ``train_psnr=30``.
         settings: single fields, such as ``schedule.fine_steps=200``.
         store: folder or fsspec address of the artifact store.
     """
-    start = perf_counter()
+    start, machine = perf_counter(), describe_machine()
     request = Request(
         scene_path=scene,
-        out=out,
         preset=preset,
         meshes=meshes,
         seed=seed,
         budget_s=budget_s,
+        until=until,
         settings=settings,
         store_url=store,
     )
-    folder = request.claim()
+    folder = request.claim(out)
     where, chosen = request.store, request.configuration
 
-    clip = extract_clip(where, request.recording, chosen.capture)
-    given = ingest_meshes(where, request.recording, request.bodies)
-    inspection = inspect_scene(where, request.recording, given, chosen.plan)
-    bodies = given
-    if inspection.holds("location_search"):
-        bodies = locate_body(where, clip, given, chosen.location)
-    repaired = repair_body(where, clip, bodies, chosen.repair)
-    plan = plan_scene(where, clip, repaired, inspection, chosen.plan)
-    density = pretrain_density(where, repaired, plan, chosen.density)
-    motion = fit_motion(where, clip, repaired, plan, density, chosen.motion)
+    prepared = prepare(request)
+    show_plan(request, prepared.plan)
+    clip, plan, bodies = prepared.clip, prepared.plan, prepared.bodies
     trained = optimise_scene(
         where,
         clip,
         plan,
-        density,
-        motion,
-        spent_on(clip, given, inspection, bodies, repaired, plan, density, motion),
+        prepared.density,
+        prepared.motion,
+        spent_on(prepared.stages, machine),
         chosen.canonical,
         chosen.motion,
         chosen.sampling,
@@ -99,8 +89,7 @@ def reconstruct(
         where, name, seed, views, trained, clip, evaluation, bodies, chosen.evaluation, chosen.truth
     )
 
-    stages = (clip, given, inspection, bodies, repaired, plan, density, motion, trained)
-    stages += (evaluation, views, scores)
+    stages = (*prepared.stages, trained, evaluation, views, scores)
     facts = describe_run(clip, evaluation, trained, scores, stages, perf_counter() - start)
     known = folder.begun.model_copy(update=facts)
     about = Aside(known.model_dump(mode="json", exclude_defaults=True))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.stopping import read_target
 from flows.user_folders import cache_folder
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.errors import InputError
@@ -28,16 +29,16 @@ def open_users_store(url: str | None) -> Store:
 
 
 class Request(BaseModel):
-    """The parameters of a reconstruction; the flow and the command line share them."""
+    """The parameters of a run; the flows and the command line share them."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     scene_path: Path
-    out: Path
     preset: str = "fast"
     meshes: Path | None = None
     seed: int = 0
     budget_s: float | None = None
+    until: str | None = None
     settings: tuple[str, ...] = ()
     store_url: str | None = None
 
@@ -47,13 +48,14 @@ class Request(BaseModel):
 
     @cached_property
     def configuration(self) -> Configuration:
-        """The preset with the settings and the budget applied."""
+        """The preset with the settings, the budget and the score to reach applied."""
         if self.preset not in PRESETS:
             raise InputError(
                 f"--preset must be one of {', '.join(PRESETS)}", repr(self.preset), "Choose one."
             )
         budget = () if self.budget_s is None else (f"schedule.budget_s={self.budget_s}",)
-        return with_settings(PRESETS[self.preset](), (*self.settings, *budget))
+        until = () if self.until is None else (read_target(self.until),)
+        return with_settings(PRESETS[self.preset](), (*self.settings, *budget, *until))
 
     @cached_property
     def store(self) -> Store:
@@ -76,8 +78,8 @@ class Request(BaseModel):
         """The evaluation cameras' files and the truth."""
         return evaluation_source(self.scene)
 
-    def claim(self) -> RunFolder:
-        """Take the output folder. Raises InputError when it holds anything else."""
+    def claim(self, out: Path) -> RunFolder:
+        """Take a folder for the results. Raises InputError when it holds anything else."""
         begun = RunRecord(
             request=self._key(),
             scene=self.scene.description.name,
@@ -89,7 +91,7 @@ class Request(BaseModel):
             license=self.scene.description.license,
             attribution=self.scene.description.attribution,
         )
-        return RunFolder.claim(self.out, begun)
+        return RunFolder.claim(out, begun)
 
     def _key(self) -> str:
         inputs = {

@@ -16,7 +16,6 @@ from mocoflow_core.artifacts import (
     SceneArtifact,
     ScoresArtifact,
 )
-from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunRecord, StageRecord
 from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
 
@@ -37,7 +36,7 @@ def describe_run(
     camera = {**clip.summary["camera"]}
     train_camera = camera.pop("name")
     return {
-        "machine": {**describe_machine(), "threads": trained.summary["threads"]},
+        "machine": {**trained.summary["machine"], "threads": trained.summary["threads"]},
         "train_camera": train_camera,
         "capture": {name: clip.summary[name] for name in CAPTURE},
         "cameras": {train_camera: camera, **evaluation.summary["cameras"]},

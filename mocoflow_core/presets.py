@@ -15,7 +15,7 @@ from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.methods.presentation import PresentationConfig
 from mocoflow_core.methods.truth_errors import TruthConfig
 from mocoflow_core.metrics.score import EvaluationConfig
-from mocoflow_core.planning.plan import PlanConfig
+from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training.pretrain_density import DensityConfig
 from mocoflow_core.training.schedule import ScheduleConfig

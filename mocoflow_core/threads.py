@@ -26,6 +26,15 @@ def torch_threads(threads: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
+def seconds_of(work: Callable[[], None]) -> float:
+    """Wall seconds of a piece of work on the present threads; the first one only warms up."""
+    work()
+    start = time.perf_counter()
+    for _ in range(_REPEATS):
+        work()
+    return (time.perf_counter() - start) / _REPEATS
+
+
 def choose_threads(forced: int | None, work: Callable[[], None]) -> int:
     """Threads for some work: ``forced``, or whichever of one and all cores does it faster.
 

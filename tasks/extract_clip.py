@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from mocoflow_core.artifacts import ClipArtifact
 from mocoflow_core.capture import extract
-from mocoflow_core.capture.extract import CaptureConfig
+from mocoflow_core.capture.extract import CaptureConfig, ClipNeeds
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.capture.strange_frames import sound_clip
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Broken frames are left out, silent masks not believed.
+ALGORITHM_VERSION = 2  # Broken and repeated frames are left out, silent masks not believed.
 
 
 @stage(ClipArtifact, ALGORITHM_VERSION)
-def extract_clip(work: Stage, recording: Source, capture: CaptureConfig) -> Summary:
+def extract_clip(
+    work: Stage, recording: Source, capture: CaptureConfig, needs: ClipNeeds
+) -> Summary:
     """Frames, masks, background and camera of the train side (MoCo-Flow sec. 4, data).
 
     Output: ``clip.json`` and an ``.npy`` file for each array of the clip. A few seconds.
     """
     scene = open_scene(recording.path)
-    extracted = extract.extract_clip(scene, capture)
+    extracted = extract.extract_clip(scene, capture, needs)
     clip, warnings = sound_clip(extracted, capture.difference_threshold)
     clip.save(work.folder)
     return {
         "frames": len(clip.frame_indices),
+        "repeated": len(extract.select_training_frames(scene, capture).all)
+        - len(clip.frame_indices),
         "held_out": int(clip.held_out.sum()),
         "first_frame": int(clip.frame_indices[0]),
         "last_frame": int(clip.frame_indices[-1]),

@@ -19,7 +19,7 @@ from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.training import fit_motion as training
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # A body that stands still has one table for all frames.
 
 
 @stage(MotionArtifact, ALGORITHM_VERSION)
@@ -42,6 +42,7 @@ def fit_motion(
         MeshSequence.load(work.open(bodies) / "meshes.npz"),
         CanonicalDensity.load(work.open(density)),
         decided.shell_width_m,
+        decided.needs("motion_fields"),
         motion,
     )
     start.save(work.folder)

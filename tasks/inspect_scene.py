@@ -6,11 +6,12 @@ from mocoflow_core.artifacts import InspectionArtifact, MeshArtifact
 from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.planning import inspection
-from mocoflow_core.planning.plan import PlanConfig, decide_location
+from mocoflow_core.planning.configuration import PlanConfig
+from mocoflow_core.planning.preparation import decide_preparation
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Says of all preparation whether it is needed.
 
 
 @stage(InspectionArtifact, ALGORITHM_VERSION)
@@ -24,7 +25,8 @@ def inspect_scene(
     ingested = IngestedMeshes.load(work.open(meshes))
     found = inspection.inspect_scene(open_scene(recording.path), ingested)
     (work.folder / "inspection.json").write_text(found.model_dump_json(indent=1))
+    decided = decide_preparation(found, plan)
     return {
-        "location_search": decide_location(found, plan).needed,
+        **{decision.name: decision.needed for decision in decided},
         "warnings": list(found.warnings),
     }

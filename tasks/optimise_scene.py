@@ -17,13 +17,14 @@ from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training import optimise_scene as training
-from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.optimise_scene import Learned
 from mocoflow_core.training.schedule import ScheduleConfig
+from tasks.growing_curve import GrowingCurve
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # The guard goes back from losses that rise, and at the end.
+ALGORITHM_VERSION = 2  # Guard of rising losses; held-out pixels; schedules in shares.
 
 
 @stage(SceneArtifact, ALGORITHM_VERSION, resumes=True)
@@ -48,6 +49,8 @@ def optimise_scene(
     """
     seen = Clip.load(work.open(clip))
     decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
+    canonical = canonical.model_copy(update={"finest_m": decided.no_finer(canonical.finest_m)})
+    sampling = sampling.model_copy(update={"step_m": decided.no_finer(sampling.step_m)})
     spent = Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
     result = training.optimise_scene(
         seen,
@@ -75,13 +78,20 @@ def optimise_scene(
         spent,
         work.folder,
         work.progress,
+        GrowingCurve(spent).show,
+        TrainingClock(paused=work.leave_out),
     )
     return {
         "steps": result.steps,
+        "rays": result.rays,
         "threads": result.threads,
         "tries": result.tries,
         "events": [str(event) for event in result.events],
         "losses": result.losses,
+        "train_psnr": result.train_psnr,
+        "held_out": result.held_out,
+        "warnings": list(result.warnings),
+        "machine": before.values["machine"],
         "before_wall_s": spent.wall,
         "before_cpu_s": spent.cpu,
     }

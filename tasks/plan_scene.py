@@ -11,11 +11,14 @@ from mocoflow_core.artifacts import (
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.planning import plan as planning
+from mocoflow_core.planning.configuration import PlanConfig
+from mocoflow_core.planning.decision import Decision
 from mocoflow_core.planning.inspection import Inspection
-from mocoflow_core.planning.plan import PlanConfig
+from mocoflow_core.planning.preparation import decide_frames, decide_preparation
+from mocoflow_core.planning.visibility import visibility_warnings
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Shell, detail, repair and repeated frames are decisions.
 
 
 @stage(PlanArtifact, ALGORITHM_VERSION)
@@ -31,7 +34,14 @@ def plan_scene(
     Output: ``plan.json``. A few seconds.
     """
     found = Inspection.model_validate_json((work.open(inspection) / "inspection.json").read_text())
+    repair = Decision.model_validate_json((work.open(bodies) / "decision.json").read_text())
     meshes = MeshSequence.load(work.open(bodies) / "meshes.npz")
-    decided = planning.plan_scene(Clip.load(work.open(clip)), meshes, found, plan)
+    seen = Clip.load(work.open(clip))
+    frames = decide_frames(clip.summary["repeated"], clip.summary["frames"], plan)
+    preparation = (*decide_preparation(found, plan), frames, repair)
+    decided = planning.plan_scene(seen, meshes, preparation, plan)
     (work.folder / "plan.json").write_text(decided.model_dump_json(indent=1))
-    return {"needed": {decision.name: decision.needed for decision in decided.decisions}}
+    return {
+        "needed": {decision.name: decision.needed for decision in decided.decisions},
+        "warnings": list(visibility_warnings(decided.unseen_share, seen.camera.name)),
+    }

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from mocoflow_core.artifacts import ClipArtifact, LocationArtifact, MeshArtifact, RepairArtifact
-from mocoflow_core.body import repair as repairing
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.motion_checks import check_agreement
 from mocoflow_core.body.repair import RepairConfig
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.planning.decision import Force
+from mocoflow_core.planning.repair import repair_where_needed
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Fits the colours as well; frames that fit far worse are noticed.
+ALGORITHM_VERSION = 2  # Fits the colours as well, says why; frames that fit far worse are noticed.
 
 
 @stage(RepairArtifact, ALGORITHM_VERSION)
@@ -19,13 +20,16 @@ def repair_body(
     clip: ClipArtifact,
     bodies: MeshArtifact | LocationArtifact,
     repair: RepairConfig,
+    force: Force,
 ) -> Summary:
     """Joints and place corrected before anything is learned; an estimate that agrees is kept.
 
-    Output: ``meshes.npz`` in world metres. About a second, or 0.2 s a frame where it is needed.
+    Output: ``meshes.npz`` in world metres, ``decision.json``. About a second, or 0.2 s a frame
+    where it is needed.
     """
     seen = Clip.load(work.open(clip))
     given = MeshSequence.load(work.open(bodies) / "meshes.npz")
-    fitted = repairing.repair_body(seen, given, repair, work.progress)
-    fitted.save(work.folder / "meshes.npz")
-    return {"repaired": fitted is not given, "warnings": list(check_agreement(seen, fitted))}
+    meshes, decision = repair_where_needed(seen, given, repair, force, work.progress)
+    meshes.save(work.folder / "meshes.npz")
+    (work.folder / "decision.json").write_text(decision.model_dump_json(indent=1))
+    return {"repaired": decision.needed, "warnings": list(check_agreement(seen, meshes))}

@@ -45,6 +45,7 @@ class Stage:
     folder: Path
     progress: Progress
     store: Store
+    leave_out: Callable[[float, float], None]  # wall and CPU seconds that were no work on it
 
     def open(self, artifact: Artifact) -> Path:
         """The folder with an input's payload files."""
@@ -97,7 +98,8 @@ class CachedStage(Generic[Inputs, Kind]):
                 return work.found
             # More than one thread only where a stage has measured that it pays.
             with torch_threads(1), showing_progress(self.kind.stage, work.note_time) as progress:
-                summary = self.body(Stage(work.path, progress, store), **arguments)  # type: ignore
+                stage = Stage(work.path, progress, store, work.leave_out)
+                summary = self.body(stage, **arguments)  # type: ignore
             return work.commit(self.version, *_by_content(arguments), summary)
 
     def _key(self, arguments: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from mocoflow_core.report.inputs import ReportInputs
 from mocoflow_core.report.page import write_report as write
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Says which train pixels drew the curve.
 
 
 @stage(ReportArtifact, ALGORITHM_VERSION)
@@ -51,6 +51,7 @@ def write_report(
         turntable=rendered / "turntable.mp4",
         warnings=[str(warning) for warning in run.values.get("warnings", ())],
         guard_events=[str(event) for event in trained.summary["events"]],
+        held_out=str(trained.summary["held_out"]),
     )
     write(inputs, work.folder / "report.html")
     picture = work.folder / "error_curve.png"

@@ -21,11 +21,17 @@ from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.synthetic.toy import ToyConfig, write_toy_scene
-from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
-from mocoflow_core.training.optimise_scene import Learned, OptimisationResult, optimise_scene
+from mocoflow_core.training.optimise_scene import (
+    Learned,
+    OptimisationResult,
+    optimise_scene,
+    unwatched,
+)
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
 from mocoflow_core.training.schedule import ScheduleConfig
+from mocoflow_core.training.snapshots import Snapshot
 
 SHELL_M = 0.06
 MOTION = MotionConfig(residual=ResidualConfig(hidden=16))
@@ -73,7 +79,7 @@ def prepare(scene: Path) -> Prepared:
         inner_depth_m=SAMPLING.inner_depth_m,
         step_m=SAMPLING.step_m,
     )
-    motion = fit_motion(clip, meshes, density, SHELL_M, MOTION)
+    motion = fit_motion(clip, meshes, density, SHELL_M, True, MOTION)
     return Prepared(clip, meshes, density, motion, shape)
 
 
@@ -85,6 +91,9 @@ def train(
     progress: Callable[[float, str], None] = silent,
     learned: Learned | None = None,
     losses: LossConfig | None = None,
+    before: Seconds | None = None,
+    watch: Callable[[list[Snapshot]], None] = unwatched,
+    clock: TrainingClock | None = None,
 ) -> OptimisationResult:
     return optimise_scene(
         prepared.clip,
@@ -96,9 +105,11 @@ def train(
         SAMPLING,
         schedule,
         seed,
-        Seconds(),
+        before or Seconds(),
         workspace,
         progress,
+        watch,
+        clock,
     )
 
 

@@ -74,10 +74,11 @@ class MaskMisfit:
         ]
         self._configuration = configuration
 
-    def expected_share(self, vertices: NDArray[np.float32]) -> float:
-        """How large errors are to be expected, in usual ones: 0 where the estimate fits already.
+    def apart_px(self, vertices: NDArray[np.float32]) -> float:
+        """How far the body's outline is from the masks'; nan where no mask shows it.
 
-        Clothes push the whole outline outward, so a distance that all points share says nothing.
+        Three quarters of the outline are nearer. Clothes push the whole outline outward, so a
+        distance that all points share says nothing and is taken off.
 
         Args:
             vertices: (T, V, 3) the estimate at the frames looked at.
@@ -90,12 +91,8 @@ class MaskMisfit:
             off.append((apart * mask.normals[pairs.mask]).sum(-1))
         distances = np.concatenate(off)
         if not len(distances):
-            return 0.0
-        apart_px = float(np.percentile(np.abs(distances - np.median(distances)), 75))
-        agreeing_px = self._configuration.agreeing_px
-        # Where both thresholds are the same, or crossed, the ramp is a step.
-        ramp = max(self._configuration.apart_px - agreeing_px, 1e-9)
-        return float(np.clip((apart_px - agreeing_px) / ramp, 0.0, 1.0))
+            return float("nan")
+        return float(np.percentile(np.abs(distances - np.median(distances)), 75))
 
     def look(self, correction: JointCorrection) -> _Targets:
         """The points that belong together as the body stands now."""
@@ -138,6 +135,15 @@ class MaskMisfit:
         depth = float(np.median(body.depth)) if len(body.depth) else 1.0
         turn_px = self._configuration.turn_m * focal / depth
         return match_outlines(body, mask, turn_px, self._configuration.least_agreement)
+
+
+def expected_share(apart_px: float, configuration: MaskMisfitConfig) -> float:
+    """How large errors are to be expected, in usual ones: 0 where the estimate fits already."""
+    if np.isnan(apart_px):
+        return 0.0
+    # Where both thresholds are the same, or crossed, the ramp is a step.
+    ramp = max(configuration.apart_px - configuration.agreeing_px, 1e-9)
+    return float(np.clip((apart_px - configuration.agreeing_px) / ramp, 0.0, 1.0))
 
 
 def project(camera: Camera, world: Tensor) -> tuple[Tensor, Tensor]:

@@ -54,8 +54,22 @@ class RepairConfig(ConfigurationPart):
     by_both: RoundsConfig = RoundsConfig(rounds=6, steps=20, rate=0.1, outlier_m=(0.02, 0.02))
 
 
+def outlines_apart(clip: Clip, meshes: MeshSequence, configuration: RepairConfig) -> float:
+    """How far the body's outline is from the masks', in pixels; nan where no mask shows it.
+
+    See ``MaskMisfit.apart_px``. Looks at the training frames alone.
+    """
+    looked_at, rows = _training_frames(clip, meshes)
+    masks = MaskMisfit(clip, looked_at, rows, meshes.faces, configuration.masks)
+    return masks.apart_px(meshes.vertices[rows])
+
+
 def repair_body(
-    clip: Clip, meshes: MeshSequence, configuration: RepairConfig, progress: Progress
+    clip: Clip,
+    meshes: MeshSequence,
+    expected: float,
+    configuration: RepairConfig,
+    progress: Progress,
 ) -> MeshSequence:
     """The meshes with their joints and place corrected towards what the training frames show.
 
@@ -63,22 +77,17 @@ def repair_body(
     keep their lengths, clothes stand off by a distance of each part's own. First the outlines are
     laid onto the masks, then the colour of each point of the skin must stay the same as well.
     Held-out frames, which are not looked at, and frames between get the correction of the moment.
-    An estimate that agrees with the masks comes back as it was, and so does one without any mask.
+    Where no error is expected, or no mask shows anybody, the meshes come back as they were.
 
     Args:
         clip: of the camera trained on.
         meshes: world metres; holds every frame of the clip.
+        expected: size of the errors, in usual ones.
     """
-    training = ~clip.held_out & clip.has_mask
-    training &= clip.masks.reshape(len(clip.masks), -1).any(axis=1)
-    looked_at = np.flatnonzero(training)
-    if not len(looked_at):
+    looked_at, rows = _training_frames(clip, meshes)
+    if not len(looked_at) or expected == 0:
         return meshes
-    rows = np.searchsorted(meshes.frame_indices, clip.frame_indices[looked_at])
     masks = MaskMisfit(clip, looked_at, rows, meshes.faces, configuration.masks)
-    expected = masks.expected_share(meshes.vertices[rows])
-    if expected == 0:
-        return meshes
     skeleton = articulate(meshes.vertices, meshes.faces, configuration.parts, configuration.blend_m)
     colours = ColourMisfit(clip, looked_at, rows, meshes, skeleton.weights, configuration.colours)
     frames = clip.frame_indices[looked_at]
@@ -91,6 +100,15 @@ def repair_body(
         with torch.no_grad():
             vertices = correction.vertices(np.arange(len(meshes.vertices)))
     return replace(meshes, vertices=vertices)
+
+
+def _training_frames(
+    clip: Clip, meshes: MeshSequence
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of the clip, and of the meshes, of the training frames with a person in the mask."""
+    shown = ~clip.held_out & clip.has_mask & clip.masks.any(axis=(1, 2))
+    looked_at = np.flatnonzero(shown)
+    return looked_at, np.searchsorted(meshes.frame_indices, clip.frame_indices[looked_at])
 
 
 def _no_correction(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +34,13 @@ class Clip:
         """Time of each frame, normalised to [0, 1] over the clip. Source numbers keep gaps."""
         first, last = int(self.frame_indices[0]), int(self.frame_indices[-1])
         return (self.frame_indices - first) / max(last - first, 1)
+
+    def at_rows(self, rows: NDArray[np.bool_]) -> Clip:
+        """Only the frames where ``rows`` (T,) is true."""
+        if rows.all():
+            return self
+        names = ("frame_indices", "frames", "masks", "has_mask", "held_out")
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
     def save(self, folder: Path) -> None:
         """Write ``clip.json`` and one ``.npy`` for each array into an existing folder."""

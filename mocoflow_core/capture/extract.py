@@ -16,6 +16,7 @@ from mocoflow_core.capture.frame_selection import (
     select_frames,
 )
 from mocoflow_core.capture.frame_source import read_image, read_mask
+from mocoflow_core.capture.repeated_frames import repeated_frames
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.configuration import ConfigurationPart
@@ -47,14 +48,29 @@ class CaptureConfig(ConfigurationPart):
     )
 
 
-def extract_clip(scene: Scene, configuration: CaptureConfig) -> Clip:
+class ClipNeeds(ConfigurationPart):
+    """What is made instead of taken from the files; the inspection decides."""
+
+    background: bool = Field(False, description="The plate is made, also where one is given.")
+    masks: bool = Field(False, description="So are the masks, by their difference to the plate.")
+    repeated_frames: bool = Field(False, description="Frames that repeat another are kept.")
+
+
+AS_FILES_SAY = ClipNeeds()
+
+
+def extract_clip(
+    scene: Scene, configuration: CaptureConfig, needs: ClipNeeds = AS_FILES_SAY
+) -> Clip:
     """The train camera's clip. No other camera and no truth is looked at.
 
     Raises InputError when frames or masks are missing, when sizes disagree, and when there are
     neither masks nor a background plate.
     """
     selection = select_training_frames(scene, configuration)
-    clip = extract_camera(scene, scene.train_camera, selection, configuration)
+    clip = extract_camera(scene, scene.train_camera, selection, configuration, needs)
+    if not needs.repeated_frames:
+        clip = clip.at_rows(~repeated_frames(clip.frames, clip.masks, ~clip.held_out))
     if not clip.masks.any():
         raise InputError(
             f"{scene.train_camera} must show the person in a mask",
@@ -112,24 +128,29 @@ def select_training_frames(scene: Scene, configuration: CaptureConfig) -> FrameS
 
 
 def extract_camera(
-    scene: Scene, name: str, selection: FrameSelection, configuration: CaptureConfig
+    scene: Scene,
+    name: str,
+    selection: FrameSelection,
+    configuration: CaptureConfig,
+    needs: ClipNeeds = AS_FILES_SAY,
 ) -> Clip:
     """The selected frames of any camera, with their masks and what is behind the person."""
     indices = selection.all
     view = WorkingView.of(scene.cameras[name], configuration.max_side)
     frames = _frames(scene, name, indices, view)
     held_out = np.isin(indices, selection.held_out)
-    plate = _given_plate(scene, name, view)
-    mask_files = scene.masks(name)
+    plate, mask_files = _given_plate(scene, name, view), scene.masks(name)
+    # Held-out frames must not be trained on, and the plate is part of the training.
+    usable = np.flatnonzero(~held_out) if len(selection.working) else np.arange(len(indices))
     if mask_files:
         masks = _masks(mask_files, indices, view)
     else:
         assert plate is not None
         masks = masks_from_plate(frames, plate, configuration.difference_threshold)
-    if plate is None:
-        # Held-out frames must not be trained on, and the plate is part of the training.
-        usable = np.flatnonzero(~held_out) if len(selection.working) else np.arange(len(indices))
+    if plate is None or needs.background:
         plate = _plate(frames, masks, usable, configuration)
+    if needs.masks:
+        masks = masks_from_plate(frames, plate, configuration.difference_threshold)
     return Clip(
         camera=view.camera,
         fps=selection.fps,

@@ -54,6 +54,21 @@ class BodyMotion:
             self.canonical_maps.to(device),
         )
 
+    def at_times(self, times: Tensor) -> BodyMotion:
+        """The only moment of a body that stands still, at each of ``times`` (T,).
+
+        The tables are shared, not copied.
+        """
+        return BodyMotion(
+            times,
+            self.observed_grids.shared_by(len(times)),
+            self.observed_maps,
+            self.observed_distance,
+            self.observed_facing,
+            self.canonical_grid,
+            self.canonical_maps.expand(len(times), -1, -1, -1),
+        )
+
     def near_body(self, points: Tensor, frame: Tensor, within_m: float) -> Tensor:
         """Cheap test of observed points (P, 3) of frame rows (P,): may they lie near the mesh?
 

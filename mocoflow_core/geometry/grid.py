@@ -48,6 +48,11 @@ class SparseGrids:
             self.spacing,
         )
 
+    def shared_by(self, count: int) -> SparseGrids:
+        """``count`` grids that are all this one."""
+        origin, shape = self.origin.expand(count, 3), self.shape.expand(count, 3)
+        return SparseGrids(origin, shape, self.offset.expand(count), self.node_map, self.spacing)
+
     def tensors(self) -> dict[str, Tensor]:
         """All content as named tensors, for saving."""
         return {

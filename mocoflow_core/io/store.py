@@ -106,6 +106,10 @@ class Workspace(Generic[Kind]):
         """Write down the seconds worked so far, so that a kill does not forget them."""
         self._clock.note()
 
+    def leave_out(self, wall_s: float, cpu_s: float) -> None:
+        """Take off seconds that were no work on the artifact."""
+        self._clock.leave_out(wall_s, cpu_s)
+
     def commit(
         self,
         algorithm_version: int,

@@ -16,6 +16,7 @@ class WorkClock:
         self._earlier_wall_s, self._earlier_cpu_s = _read(path)
         self._wall_start = time.perf_counter()
         self._cpu_start = _cpu_seconds()
+        self._aside_wall_s, self._aside_cpu_s = 0.0, 0.0
 
     @classmethod
     def of(cls, partial: Path) -> WorkClock:
@@ -24,11 +25,16 @@ class WorkClock:
 
     @property
     def wall_s(self) -> float:
-        return self._earlier_wall_s + time.perf_counter() - self._wall_start
+        return self._earlier_wall_s + time.perf_counter() - self._wall_start - self._aside_wall_s
 
     @property
     def cpu_s(self) -> float:
-        return self._earlier_cpu_s + _cpu_seconds() - self._cpu_start
+        return self._earlier_cpu_s + _cpu_seconds() - self._cpu_start - self._aside_cpu_s
+
+    def leave_out(self, wall_s: float, cpu_s: float) -> None:
+        """Take off what did not go into the artifact, such as looking how good it is by now."""
+        self._aside_wall_s += wall_s
+        self._aside_cpu_s += cpu_s
 
     def note(self) -> None:
         """Write the sum down, by one rename."""

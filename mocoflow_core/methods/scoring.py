@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,11 +18,12 @@ from mocoflow_core.methods.rendered_views import (
 from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, few_views, score_views
 from mocoflow_core.methods.surface_errors import surface_rows
 from mocoflow_core.methods.truth_errors import TruthConfig, motion_rows
-from mocoflow_core.metrics.curve import write_curve
+from mocoflow_core.metrics.curve import CurveRow, write_curve
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.metrics.table import mean_scores, write_scores
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.snapshots import read_snapshots, snapshot_weights
 
 METHODS = ("mocoflow", "posed_mesh")
 MeanScores = dict[str, dict[str, dict[str, float]]]  # method, camera, metric
@@ -73,6 +73,7 @@ def score_run(
     moments = [Moment("posed_mesh", "ingest_meshes", 0, before.wall, before.cpu, given)]
     moments += _kept_moments(folders.trained, renderer, clip, before)
     curve = error_curve(subject, moments, views, evaluating, progress)
+    curve += train_rows(subject, folders.trained, before)
     write_curve(curve, into / "error_curve.parquet")
     return mean_scores(rows)
 
@@ -81,14 +82,25 @@ def _kept_moments(
     trained: Path, final: TrainedRenderer, clip: Clip, before: Seconds
 ) -> list[Moment]:
     """The states that the optimisation kept, in the order of its clock."""
-    snapshots = trained / "snapshots"
     moments = []
-    for entry in json.loads((snapshots / "snapshots.json").read_text()):
-        weights = snapshots / f"{entry['step']:06d}.safetensors"
-        scene = TrainedScene.open(trained, weights)
+    for snapshot in read_snapshots(trained):
+        scene = TrainedScene.open(trained, snapshot_weights(trained, snapshot))
         scene.share_bodies(final.scene)
         renderer = TrainedRenderer(scene, clip)
-        clock = before + Seconds(entry["wall_s"], entry["cpu_s"])
-        state = (entry["step"], clock.wall, clock.cpu, renderer)
+        clock = before + Seconds(snapshot.wall_s, snapshot.cpu_s)
+        state = (snapshot.step, clock.wall, clock.cpu, renderer)
         moments.append(Moment("mocoflow", "optimise_scene", *state))
     return moments
+
+
+def train_rows(subject: Subject, trained: Path, before: Seconds) -> list[CurveRow]:
+    """``train_psnr`` at each kept state, as it was measured when the state was taken."""
+    return [
+        CurveRow(
+            *(subject.scene, "mocoflow", subject.seed, "optimise_scene", snapshot.step),
+            *(before.wall + snapshot.wall_s, before.cpu + snapshot.cpu_s),
+            *("train_psnr", snapshot.train_psnr),
+        )
+        for snapshot in read_snapshots(trained)
+        if snapshot.train_psnr is not None
+    ]

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, field_validator
 
 Force = Literal["auto", "on", "off"]
+Part = Literal["preparation", "optimisation", "scoring"]
 
 
 class Decision(BaseModel):
@@ -16,6 +17,7 @@ class Decision(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
+    part: Part
     needed: bool
     reason: str
     evidence: dict[str, float] = {}

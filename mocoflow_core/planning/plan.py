@@ -2,63 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
-from mocoflow_core.body.light import LightConfig, measure_light
+from mocoflow_core.body.light import measure_light
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.capture.scene import Scene
-from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.errors import InputError
 from mocoflow_core.planning.brightness import brightness_shifts
 from mocoflow_core.planning.canonical_frame import closeness
-from mocoflow_core.planning.decision import Decision, Force
-from mocoflow_core.planning.inspection import Inspection
+from mocoflow_core.planning.configuration import PlanConfig
+from mocoflow_core.planning.decision import Decision
 from mocoflow_core.planning.mask_agreement import MaskAgreement, mask_agreement
-
-
-class PlanConfig(ConfigurationPart):
-    """Thresholds of the decisions; each decision can be forced on or off."""
-
-    background_extraction: Force = "auto"
-    mask_segmentation: Force = "auto"
-    location_search: Force = "auto"
-    motion_fields: Force = "auto"
-    motion_residual: Force = "auto"
-    motion_consensus: Force = "auto"
-    appearance_codes: Force = "auto"
-    fixed_light: Force = "auto"
-    trusted_overlap: float = Field(
-        0.6, ge=0, le=1, description="Silhouette overlap from which a given location is trusted."
-    )
-    still_px: float = Field(
-        0.5, ge=0, description="A body whose points move less than this, in pixels, is still."
-    )
-    consistent_px: float = Field(
-        1.5, ge=0, description="Outlines nearer than this, in pixels, leave nothing to correct."
-    )
-    constant_brightness: float = Field(
-        0.02, ge=0, description="Brightness of the person that changes less than this is constant."
-    )
-    light: LightConfig = LightConfig()
-    faint_light: float = Field(
-        0.05, ge=0, description="A light that changes brightness by less than this is left out."
-    )
-    narrowest_shell_m: float = Field(0.03, gt=0, description="Least shell around the body, metres.")
-    widest_shell_m: float = Field(0.15, gt=0, description="Largest shell around the body, metres.")
+from mocoflow_core.planning.visibility import unseen_share
 
 
 class ScenePlan(BaseModel):
-    """Every decision with its evidence, and the two numbers the fields are built from."""
+    """Every decision with its evidence, and the numbers the fields are built from."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     decisions: tuple[Decision, ...]
     canonical_frame: int  # source number
     shell_width_m: float  # density can be so far from the body
+    detail_m: float  # no cell and no step needs to be finer; 0: as the configuration says
     light: tuple[float, float, float]  # linear brightness is 1 + light . normal, world space
+    unseen_share: float  # of the body's surface, from the train camera
 
     def needs(self, name: str) -> bool:
         """Whether the named thing is to be done. Raises KeyError for an unknown name."""
@@ -71,107 +42,50 @@ class ScenePlan(BaseModel):
                 return decision
         raise KeyError(f"no decision {name!r}: {', '.join(d.name for d in self.decisions)}")
 
+    def no_finer(self, length_m: float) -> float:
+        """A cell or step of this length, or a coarser one where pixels cannot show it."""
+        return max(length_m, self.detail_m)
+
 
 def plan_scene(
-    clip: Clip, meshes: MeshSequence, inspection: Inspection, configuration: PlanConfig
+    clip: Clip,
+    meshes: MeshSequence,
+    preparation: Sequence[Decision],
+    configuration: PlanConfig,
 ) -> ScenePlan:
-    """Decide from the train camera alone. ``meshes`` in world metres, covering the clip."""
+    """Decide from the train camera alone.
+
+    Args:
+        meshes: world metres, covering the clip.
+        preparation: what was decided before, to be listed first.
+    """
     posed = meshes.at(clip.frame_indices)
     agreement = mask_agreement(clip, posed)
     moves = _moves(clip, posed, configuration)
     residual = _residual(agreement, moves.needed, configuration)
     light = measure_light(clip, posed, configuration.light)
     lit = _light(light, configuration)
+    shell = _shell(agreement, configuration)
+    detail = _detail(agreement, configuration)
     decisions = (
-        _background(inspection).forced(configuration.background_extraction),
-        _segmentation(inspection).forced(configuration.mask_segmentation),
-        decide_location(inspection, configuration),
+        *preparation,
         moves,
         residual,
         _consensus(residual).forced(configuration.motion_consensus),
         _appearance(clip, posed, configuration),
         lit,
+        shell,
+        detail,
     )
     trained = np.flatnonzero(~clip.held_out)
     spread = closeness(posed.at(clip.frame_indices[trained]))
-    shell = agreement.outside_m if np.isfinite(agreement.outside_m) else np.inf
     return ScenePlan(
         decisions=decisions,
         canonical_frame=int(clip.frame_indices[trained[spread.argmin()]]),
-        shell_width_m=float(
-            np.clip(shell, configuration.narrowest_shell_m, configuration.widest_shell_m)
-        ),
+        shell_width_m=_shell_width(agreement, shell, configuration),
+        detail_m=0.0 if detail.needed else _visible_detail_m(agreement, configuration),
         light=tuple((light if lit.needed else np.zeros(3)).tolist()),
-    )
-
-
-def decide_location(inspection: Inspection, configuration: PlanConfig) -> Decision:
-    """Whether the body's location must be searched; asked before any mesh is in the world.
-
-    Raises InputError when it is forced off for meshes that have no location at all.
-    """
-    overlap = inspection.overlap
-    if inspection.coordinates == "camera-root-centred" and configuration.location_search == "off":
-        raise InputError(
-            "meshes with a location when plan.location_search is off",
-            "root-centred ones",
-            "Leave plan.location_search on auto.",
-        )
-    if not inspection.located:
-        reason = "the meshes come without a location that can be trusted"
-        needed = True
-    elif overlap is not None and overlap < configuration.trusted_overlap:
-        reason = f"the given location overlaps the masks by {overlap:.2f} only"
-        needed = True
-    else:
-        reason = "the meshes come with a location that overlaps the masks well"
-        needed = False
-    return Decision(
-        name="location_search",
-        needed=needed,
-        reason=reason,
-        evidence={} if overlap is None else {"overlap": overlap},
-        threshold=configuration.trusted_overlap,
-        saves="the 3-D grid search, about 0.1 s a frame",
-    ).forced(configuration.location_search)
-
-
-def decide_evaluation(scene: Scene) -> Decision:
-    """Whether other cameras can be scored. For the protocol alone: it must not reach a plan."""
-    cameras = [name for name in scene.evaluation_cameras if scene.masks(name)]
-    return Decision(
-        name="evaluation_cameras",
-        needed=bool(cameras),
-        reason=f"{len(cameras)} other cameras have masks to score against"
-        if cameras
-        else "no other camera with masks: held-out frames of the train camera remain",
-        evidence={"cameras": float(len(cameras))},
-        threshold=1.0,
-        saves="rendering and scoring the other cameras' views",
-    )
-
-
-def _background(inspection: Inspection) -> Decision:
-    given = inspection.background_given
-    return Decision(
-        name="background_extraction",
-        needed=not given,
-        reason="the scene brings a background plate" if given else "the scene brings no plate",
-        evidence={"plates": float(given)},
-        threshold=1.0,
-        saves="the median over the frames in which the person does not cover a pixel",
-    )
-
-
-def _segmentation(inspection: Inspection) -> Decision:
-    given = inspection.masks_given
-    return Decision(
-        name="mask_segmentation",
-        needed=not given,
-        reason="the scene brings masks" if given else "masks are the difference to the background",
-        evidence={"masks": float(given)},
-        threshold=1.0,
-        saves="segmenting every frame",
+        unseen_share=unseen_share(clip, posed),
     )
 
 
@@ -181,11 +95,12 @@ def _moves(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> Decis
     moves = moved_px > configuration.still_px
     return Decision(
         name="motion_fields",
+        part="optimisation",
         needed=moves,
         reason="the body moves" if moves else "the body stands still",
         evidence={"moved_px": moved_px},
         threshold=configuration.still_px,
-        saves="both motion fields: every frame sees the canonical body",
+        saves="a look-up table of the motion for each frame: all frames share one",
     ).forced(configuration.motion_fields)
 
 
@@ -199,6 +114,7 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
         reason = "the body's outline is off the masks"
     return Decision(
         name="motion_residual",
+        part="optimisation",
         needed=wrong and moves,
         reason=reason if moves else "the body stands still",
         evidence={"outline_px": off_px, "overlap": agreement.overlap},
@@ -210,6 +126,7 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
 def _consensus(residual: Decision) -> Decision:
     return Decision(
         name="motion_consensus",
+        part="optimisation",
         needed=residual.needed,
         reason="the residual motion must agree with its inverse and between frames"
         if residual.needed
@@ -227,6 +144,7 @@ def _appearance(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> 
     varies = not changes <= configuration.constant_brightness
     return Decision(
         name="appearance_codes",
+        part="optimisation",
         needed=varies,
         reason="the person's brightness changes over the clip"
         if varies
@@ -242,6 +160,7 @@ def _light(light: NDArray[np.float64], configuration: PlanConfig) -> Decision:
     needed = strength > configuration.faint_light
     return Decision(
         name="fixed_light",
+        part="optimisation",
         needed=needed,
         reason="the person gets brighter when turning to one side"
         if needed
@@ -250,3 +169,49 @@ def _light(light: NDArray[np.float64], configuration: PlanConfig) -> Decision:
         threshold=configuration.faint_light,
         saves="shading by the direction that the skin faces",
     ).forced(configuration.fixed_light)
+
+
+def _shell(agreement: MaskAgreement, configuration: PlanConfig) -> Decision:
+    narrow_m = configuration.narrowest_shell_m
+    # An unknown agreement (no mask shows the person) is no evidence of a good one.
+    wide = not agreement.outside_m <= narrow_m
+    return Decision(
+        name="wide_shell",
+        part="optimisation",
+        needed=wide,
+        reason="the masks show the person farther out than the body"
+        if wide
+        else "the person stays close to the body",
+        evidence={"outside_m": agreement.outside_m},
+        threshold=narrow_m,
+        saves="samples where no density can be: three quarters of them, half of a step",
+    ).forced(configuration.wide_shell)
+
+
+def _shell_width(agreement: MaskAgreement, shell: Decision, configuration: PlanConfig) -> float:
+    """As wide as measured; the widest where it is unknown or asked for against the measurement."""
+    narrow_m, wide_m = configuration.narrowest_shell_m, configuration.widest_shell_m
+    if not shell.needed:
+        return narrow_m
+    measured = agreement.outside_m if agreement.outside_m > narrow_m else wide_m
+    return min(measured, wide_m)
+
+
+def _visible_detail_m(agreement: MaskAgreement, configuration: PlanConfig) -> float:
+    detail_m = configuration.detail_px * agreement.pixel_m
+    return float(detail_m) if np.isfinite(detail_m) else 0.0
+
+
+def _detail(agreement: MaskAgreement, configuration: PlanConfig) -> Decision:
+    coarse = _visible_detail_m(agreement, configuration) > configuration.fine_m
+    return Decision(
+        name="fine_detail",
+        part="optimisation",
+        needed=not coarse,
+        reason="pixels are too coarse for what fine cells and short steps could show"
+        if coarse
+        else "pixels show as much as the fine cells and short steps can hold",
+        evidence={"pixel_m": agreement.pixel_m},
+        threshold=configuration.fine_m / configuration.detail_px,
+        saves="cells and samples below a share of a pixel",
+    ).forced(configuration.fine_detail)

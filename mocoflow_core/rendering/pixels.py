@@ -24,6 +24,10 @@ class ShellPixels:
     nearest: Tensor  # (N,) metres along the viewing axis
     farthest: Tensor  # (N,)
 
+    def select(self, keep: Tensor) -> ShellPixels:
+        """Only the pixels where ``keep`` (N,) is true."""
+        return ShellPixels(self.pixels[keep], self.nearest[keep], self.farthest[keep])
+
 
 def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: float) -> ShellPixels:
     """Pixels that rays through the shell of one moment can belong to.

@@ -18,7 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from mocoflow_core.metrics.curve import CurveRow, StageSpan, as_error
 from mocoflow_core.report.metric_labels import label_of
 
-PANELS = ("psnr_union", "ssim", "mask_iou", "keypoint_mm", "correspondence_mm")
+PANELS = ("psnr_union", "train_psnr", "mask_iou", "ssim", "keypoint_mm", "correspondence_mm")
 ERROR_NAMES = {"ssim": "1 - SSIM", "mask_iou": "1 - mask overlap"}
 INK, QUIET, ACCENT, WARM = "#3c3f44", "#8a8f98", "#0f766e", "#b45309"
 STAGE_COLOURS = ("#b9c9d8", "#e6d3b0", "#c6d9bf", "#e6c9c9", "#cdc6e2", "#bcdcd9", "#dfdfbd")

@@ -36,6 +36,7 @@ class ReportInputs:
     turntable: Path | None = None  # an H.264 mp4
     warnings: Sequence[str] = ()
     guard_events: Sequence[str] = ()  # steps refused, states restored
+    held_out: str = ""  # which pixels of the train camera scored the run while it went on
 
     @property
     def method(self) -> str:

@@ -64,6 +64,7 @@ def _context(inputs: ReportInputs) -> dict[str, Any]:
         "table": view_table(rows, inputs.train_camera),
         "repairs": repairs(rows, inputs.method),
         "curve": _curve(inputs, rows),
+        "held_out": inputs.held_out,
         "left_out": [decision for decision in decisions if not decision["needed"]],
         "kept": [decision for decision in decisions if decision["needed"]],
         "stages": stages,

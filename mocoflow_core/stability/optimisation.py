@@ -18,6 +18,7 @@ from mocoflow_core.stability.toy_scene import (
 )
 from mocoflow_core.stability.usable_scene import USABLE_DB, WHY_USABLE, lost
 from mocoflow_core.training.guard import TrainingDiverged
+from mocoflow_core.training.pace import Pace
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
 
 SHORT = SCHEDULE.model_copy(update={"coarse_steps": 20, "fine_steps": 10})
@@ -79,9 +80,10 @@ def _no_steps(steps: float) -> Found:
     count = int(steps)
     off = 0.0
     for step in {0, count // 2, max(count - 1, 0)}:
-        factor = rate_factor(step, count, 0.1)
-        for share in (0.0, 0.5, 1.0):
-            bands = band_alpha(step, max(count, 1), share, 8)
+        done = Pace(count).share(step, 0.0)
+        factor = rate_factor(done, 0.1)
+        for coarse_share in (0.0, 0.5, 1.0):
+            bands = band_alpha(done, coarse_share, 8)
             off = max(off, -bands, bands - 8.0, factor - 1.0, 0.1 - factor)
     schedule = SHORT.model_copy(update={"coarse_steps": count, "fine_steps": 0})
     weights = train(toy(), schedule).weights if count < 10 else ()

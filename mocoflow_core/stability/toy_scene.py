@@ -32,7 +32,7 @@ from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.synthetic.toy import ToyConfig, write_toy_scene
 from mocoflow_core.training.batches import TrainingPixels
-from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.objective import Objective
@@ -132,7 +132,7 @@ def prepare(clip: Clip, meshes: MeshSequence) -> Prepared:
         step_m=SAMPLING.step_m,
     )
     return Prepared(
-        clip, meshes, density, fit_motion(clip, meshes, density, SHELL_M, MOTION), shape
+        clip, meshes, density, fit_motion(clip, meshes, density, SHELL_M, True, MOTION), shape
     )
 
 
@@ -162,6 +162,9 @@ def train(
             Seconds(),
             Path(folder),
             lambda fraction, text: None,
+            lambda curve: None,
+            None,
+            TrainingClock(),
         )
         disturb(run)
         run.run()

@@ -13,6 +13,7 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.geometry.rays import Rays, pixel_rays
 from mocoflow_core.rendering.pixels import shell_pixels
+from mocoflow_core.training.held_out import HeldOutPixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +35,17 @@ class TrainingPixels:
     """The training frames of a clip and, per frame, the pixels that the shell projects to.
 
     Pixels that the shell does not reach show the background whatever is learned, so no ray goes
-    there. Raises InputError where the body is in sight of no frame.
+    there; nor to those that are held out to score the run. Raises InputError where the body is in
+    sight of no frame.
     """
 
-    def __init__(self, clip: Clip, body: BodyMotion, shell_width_m: float) -> None:
+    def __init__(
+        self,
+        clip: Clip,
+        body: BodyMotion,
+        shell_width_m: float,
+        held_out: HeldOutPixels | None = None,
+    ) -> None:
         rows = np.flatnonzero(~clip.held_out)
         self.camera = clip.camera
         pixels = clip.camera.width * clip.camera.height
@@ -46,6 +54,9 @@ class TrainingPixels:
         self.has_mask = torch.from_numpy(clip.has_mask[rows])
         self.background = torch.from_numpy(clip.background.reshape(pixels, 3).copy())
         shells = [shell_pixels(clip.camera, body, row, shell_width_m) for row in range(len(rows))]
+        if held_out is not None:
+            kept_out = torch.from_numpy(held_out.mask(clip)[rows])
+            shells = [s.select(~kept_out[row][s.pixels]) for row, s in enumerate(shells)]
         self.candidates = torch.cat([shell.pixels for shell in shells])
         self.nearest = torch.cat([shell.nearest for shell in shells])
         self.farthest = torch.cat([shell.farthest for shell in shells])

@@ -20,14 +20,17 @@ _FILE = "checkpoint.safetensors"
 
 @dataclass
 class Progress:
-    """Where the optimisation stands. Threads and steps are fixed at the first start."""
+    """Where the optimisation stands. Threads, steps and rays are fixed at the first start."""
 
     threads: int
-    steps: int
+    steps: int  # of the whole schedule; with a budget the most that are made
+    rays: int  # of one step
+    started_s: float = 0.0  # wall seconds of ``elapsed`` at the first step
     step: int = 0
-    snapshots: int = 0
     rate_scale: float = 1.0
     elapsed: Seconds = field(default_factory=Seconds)
+    snapshot_s: float = 0.0  # wall seconds of ``elapsed`` at the last snapshot
+    reached: bool = False  # the score at which the run may stop
     events: list[GuardEvent] = field(default_factory=list)
     tries: int = 1
 

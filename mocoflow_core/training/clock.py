@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 
@@ -24,23 +27,61 @@ def now() -> Seconds:
     return Seconds(time.perf_counter(), time.process_time())
 
 
+def unheard(wall_s: float, cpu_s: float) -> None:
+    """Nobody else keeps a clock that has to leave pauses out."""
+
+
 class TrainingClock:
-    """Runs on from what earlier stages and earlier tries have used; stops while evaluating."""
-
-    def __init__(self, before: Seconds) -> None:
-        self._before = before
-        self._start = now()
-
-    def read(self) -> Seconds:
-        return self._before + (now() - self._start)
-
-
-def snapshot_due(taken: int, wall_s: float, earlier_s: float) -> bool:
-    """Whether the next geometric time (1, 2, 4, 8, ... s after ``earlier_s``) has passed.
+    """Runs from its creation on; stops while the scene is evaluated.
 
     Args:
-        taken: snapshots taken so far.
-        wall_s: training clock now.
-        earlier_s: training clock when the optimisation started.
+        paused: is told the wall and CPU seconds of each pause, when it ends.
+        now: what the time is; another one than the machine's makes runs of any speed.
     """
-    return wall_s - earlier_s >= 2.0**taken
+
+    def __init__(
+        self,
+        paused: Callable[[float, float], None] = unheard,
+        now: Callable[[], Seconds] = now,
+    ) -> None:
+        self._tell = paused
+        self._now = now
+        self._start = now()
+        self._pauses = Seconds()
+        self._earlier = Seconds()
+
+    def go_on_from(self, elapsed: Seconds) -> None:
+        """Add what earlier tries have used."""
+        self._earlier = elapsed
+
+    def read(self) -> Seconds:
+        """Work so far, earlier tries included."""
+        return self._earlier + (self._now() - self._start - self._pauses)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """What happens inside costs no training time."""
+        stopped = self._now()
+        try:
+            yield
+        finally:
+            pause = self._now() - stopped
+            self._pauses += pause
+            self._tell(pause.wall, pause.cpu)
+
+
+def snapshot_due(last_s: float, now_s: float, before_s: float) -> bool:
+    """Whether a geometric time (1, 2, 4, 8, ... s) has passed since the last snapshot.
+
+    Both on the whole training clock, where methods meet, and on the optimisation's own seconds,
+    where most is learned.
+
+    Args:
+        last_s, now_s: seconds of the optimisation at the last snapshot and now.
+        before_s: seconds of the training clock before the optimisation.
+    """
+    return any(_doublings(now_s + s) > _doublings(last_s + s) for s in (0.0, before_s))
+
+
+def _doublings(seconds: float) -> int:
+    return math.floor(math.log2(seconds)) if seconds >= 1.0 else -1

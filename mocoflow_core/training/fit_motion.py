@@ -8,7 +8,7 @@ of fitting out with evidence.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -61,13 +61,20 @@ def fit_motion(
     meshes: MeshSequence,
     density: CanonicalDensity,
     shell_width_m: float,
+    moves: bool,
     configuration: MotionConfig,
 ) -> MotionStart:
     """Measure the mesh's motion and build both directions of the motion field from it.
 
+    Args:
+        moves: false: the canonical body stands in every frame, and all frames share one table.
+
     Source: MoCo-Flow sec. 3.4, second stage; method notes, fast representation.
     """
     meshes = meshes.at(clip.frame_indices)
+    if not moves:
+        still = np.broadcast_to(density.vertices, meshes.vertices.shape)
+        meshes = replace(meshes, vertices=still)
     body_configuration = configuration.body
     controls = rigid_controls(
         density.vertices,
@@ -78,10 +85,13 @@ def fit_motion(
         body_configuration.neighbours,
     )
     training = np.flatnonzero(~clip.held_out)
+    different = training if moves else training[:1]
     body = build_body_motion(
-        controls.frames(training), density.prior(), shell_width_m, body_configuration
+        controls.frames(different), density.prior(), shell_width_m, body_configuration
     )
-    fit = measure_fit(body, density.vertices, meshes.vertices[training])
+    fit = measure_fit(body, density.vertices, meshes.vertices[different])
+    if not moves:
+        body = body.at_times(torch.from_numpy(clip.times[training]))
     return MotionStart(controls, body, fit)
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import torch
-from safetensors.torch import save_file
 
 from mocoflow_core.fields.scene_field import SceneField
-from mocoflow_core.threads import choose_threads, torch_threads
+from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.checkpoint import (
     Progress,
@@ -22,16 +21,23 @@ from mocoflow_core.training.checkpoint import (
 from mocoflow_core.training.clock import Seconds, TrainingClock, snapshot_due
 from mocoflow_core.training.guard import Guard
 from mocoflow_core.training.objective import Objective
+from mocoflow_core.training.pace import plan_pace, plan_rays
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
+from mocoflow_core.training.snapshots import Snapshot, keep_snapshot
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
 _START_RAYS = 1024  # that tell how large the losses are at the start
-_PROBE_STEPS = 20  # steps that measure the speed before a budget fixes their number
+
+Score = Callable[[SceneField], float]
 
 
 class TrainingRun:
-    """One optimisation, started or resumed."""
+    """One optimisation, started or resumed.
+
+    ``score`` is ``train_psnr`` of the held-out pixels, asked while the clock stands still; each
+    snapshot hands the curve so far to ``watch``.
+    """
 
     def __init__(
         self,
@@ -43,6 +49,9 @@ class TrainingRun:
         before: Seconds,
         workspace: Path,
         progress: Callable[[float, str], None],
+        watch: Callable[[list[Snapshot]], None],
+        score: Score | None,
+        clock: TrainingClock,
     ) -> None:
         self.field = field
         self.objective = objective
@@ -51,18 +60,24 @@ class TrainingRun:
         self.before = before
         self.workspace = workspace
         self.report = progress
+        self.watch = watch
+        self.score = score
+        self.clock = clock
         self.generator = torch.Generator().manual_seed(seed)
-        self.optimiser = _optimiser(field, schedule)
+        # Torch loads its compiler with the first optimiser, for seconds: an import, not work.
+        with clock.paused():
+            self.optimiser = _optimiser(field, schedule)
         self._base_rates = [group["lr"] for group in self.optimiser.param_groups]
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
-        if restored is None:
-            threads = choose_threads(schedule.threads, self._try_out)
-            self.progress = Progress(threads, schedule.joint_steps)
-        else:
-            self.progress = restored
-            self.progress.tries += 1
-        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, schedule.rays)
+        self.progress = restored or self._first_start()
+        if restored is not None:
+            restored.tries += 1
+            clock.go_on_from(restored.elapsed)
+            restored.elapsed = clock.read()
+        pace = plan_pace(schedule, before.wall, self.progress.started_s)
+        self.pace = replace(pace, steps=self.progress.steps)
+        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, self.progress.rays)
         self.guard.expect(self._start_loss())
         self.guard.events = self.progress.events
         self.guard.rate_scale = self.progress.rate_scale
@@ -82,25 +97,51 @@ class TrainingRun:
     def forget_checkpoint(self) -> None:
         remove_checkpoint(self.workspace)
 
+    def _first_start(self) -> Progress:
+        """What a resumed run must find again: threads, steps and rays."""
+        schedule = self.schedule
+        threads = choose_threads(schedule.threads, self._try_out)
+        rays = schedule.rays
+        left_s = self._left_s()
+        if left_s is not None and left_s > 0:
+            with torch_threads(threads):
+                rays = plan_rays(schedule, left_s, seconds_of(self._try_out))
+        now = self.clock.read()
+        steps = plan_pace(schedule, self.before.wall, now.wall).steps
+        return Progress(threads, steps, rays, started_s=now.wall, elapsed=now)
+
+    def _left_s(self) -> float | None:
+        """What remains of a budget."""
+        if self.schedule.budget_s is None:
+            return None
+        return self.schedule.budget_s - (self.before + self.clock.read()).wall
+
     def _steps(self) -> None:
-        clock = TrainingClock(self.progress.elapsed)
-        saved_at = clock.read().wall
-        while self.progress.step < self.progress.steps:
-            self._step(self.progress.step)
-            self.progress.step += 1
-            self.progress.elapsed = clock.read()
-            if self.progress.step == _PROBE_STEPS:
-                self._fit_budget()
-            if snapshot_due(self.progress.snapshots, self.progress.elapsed.wall, 0.0):
-                self._snapshot()
-            if self.progress.elapsed.wall - saved_at >= self.schedule.checkpoint_every_s:
-                saved_at = self.progress.elapsed.wall
+        progress = self.progress
+        saved_s = progress.elapsed.wall
+        step_s = 0.0
+        while not self._is_over(step_s):
+            self._step(self.pace.share(progress.step, progress.elapsed.wall))
+            progress.step += 1
+            started_s, progress.elapsed = progress.elapsed.wall, self.clock.read()
+            step_s = progress.elapsed.wall - started_s
+            self._look(progress.elapsed.wall)
+            if progress.elapsed.wall - saved_s >= self.schedule.checkpoint_every_s:
+                saved_s = progress.elapsed.wall
                 self._save()
-            if self.progress.step % 10 == 0:
-                done = self.progress.step / self.progress.steps
-                self.report(done, f"step {self.progress.step} of {self.progress.steps}")
+            if progress.step % 10 == 0:
+                self.report(self.pace.share(progress.step, progress.elapsed.wall), self._text())
         self._go_back_if_bad()
         self._snapshot()
+
+    def _is_over(self, step_s: float) -> bool:
+        progress = self.progress
+        over = self.pace.is_over(progress.step, progress.elapsed.wall, step_s)
+        return over or progress.reached
+
+    def _text(self) -> str:
+        of = f" of {self.pace.steps}" if self.pace.available_s is None else ""
+        return f"step {self.progress.step}{of}"
 
     def _try_out(self) -> None:
         """The work of a step without its effect: for choosing the number of threads."""
@@ -117,15 +158,15 @@ class TrainingRun:
         batch = self.pixels.batch(rays, self.schedule.frames_per_step, generator)
         return float(torch.stack(list(self.objective(batch, generator).values())).sum())
 
-    def _step(self, step: int) -> None:
-        schedule, steps = self.schedule, self.progress.steps
+    def _step(self, share: float) -> None:
+        """One update, at a share of the schedule between 0 and 1."""
+        schedule, step = self.schedule, self.progress.step
         bands = self.field.motion.residual_to_canonical.encoding.bands
-        share = schedule.coarse_steps / max(schedule.joint_steps, 1)
-        self.field.anneal(band_alpha(step, steps, share, bands))
-        factor = rate_factor(step, steps, schedule.final_rate) * self.guard.rate_scale
+        self.field.anneal(band_alpha(share, schedule.coarse_share, bands))
+        factor = rate_factor(share, schedule.final_rate) * self.guard.rate_scale
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
-        batch = self.pixels.batch(schedule.rays, schedule.frames_per_step, self.generator)
+        batch = self.pixels.batch(self.progress.rays, schedule.frames_per_step, self.generator)
         terms = self.objective(batch, self.generator)
         self.optimiser.zero_grad(set_to_none=True)
         torch.stack(list(terms.values())).sum().backward()
@@ -150,29 +191,26 @@ class TrainingRun:
         if problem is not None:
             self._refuse(problem)
 
-    def _fit_budget(self) -> None:
-        """Shorten the schedule so that the training clock ends within the budget."""
-        if self.schedule.budget_s is None:
-            return
-        left = self.schedule.budget_s - (self.before + self.progress.elapsed).wall
-        per_step = self.progress.elapsed.wall / self.progress.step
-        possible = self.progress.step + max(int(left / per_step), 1)
-        self.progress.steps = min(self.progress.steps, possible)
+    def _look(self, wall_s: float) -> None:
+        """Keep a snapshot at geometric times; see at certain steps whether the score is reached."""
+        target, step = self.schedule.until_train_psnr, self.progress.step
+        if target is not None and step % self.schedule.until_every == 0:
+            self.progress.reached = (self._train_psnr() or 0.0) >= target
+        if snapshot_due(self.progress.snapshot_s, wall_s, self.before.wall):
+            self._snapshot()
 
     def _snapshot(self) -> None:
         if self.guard.problem({}) is not None:
             return  # the next step refuses it
-        folder = self.workspace / "snapshots"
-        folder.mkdir(exist_ok=True)
-        step = self.progress.step
-        save_file(self.field.state_dict(), folder / f"{step:06d}.safetensors")
-        self.progress.snapshots += 1
-        index = folder / "snapshots.json"
-        entries = json.loads(index.read_text()) if index.exists() else []
-        entries = [entry for entry in entries if entry["step"] < step]
-        elapsed = self.progress.elapsed
-        entries.append({"step": step, "wall_s": elapsed.wall, "cpu_s": elapsed.cpu})
-        index.write_text(json.dumps(entries))
+        self.progress.snapshot_s = self.progress.elapsed.wall
+        psnr = self._train_psnr()
+        with self.clock.paused():
+            now = self.progress.elapsed
+            self.watch(keep_snapshot(self.workspace, self.field, self.progress.step, now, psnr))
+
+    def _train_psnr(self) -> float | None:
+        with self.clock.paused():
+            return None if self.score is None else self.score(self.field)
 
     def _save(self) -> None:
         if self.guard.problem({}) is not None:

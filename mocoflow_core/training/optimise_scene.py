@@ -11,6 +11,7 @@ import torch
 from safetensors.torch import save_file
 
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.errors import InputError
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.fields.scene_field import SceneField
@@ -19,11 +20,13 @@ from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.checkpoint import Progress
-from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart
+from mocoflow_core.training.held_out import HeldOutPixels, HeldOutScore, draw_held_out
 from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.objective import Objective
 from mocoflow_core.training.schedule import ScheduleConfig
+from mocoflow_core.training.snapshots import Snapshot, read_snapshots
 
 
 @dataclass(frozen=True)
@@ -39,13 +42,21 @@ class Learned:
 class OptimisationResult:
     """What the run report needs to know about the optimisation."""
 
-    steps: int
+    steps: int  # that were made
+    rays: int  # of one step
     threads: int
     tries: int
     wall_s: float  # of this stage, all tries
     cpu_s: float
     events: list[dict[str, object]]
     losses: dict[str, float]  # mean over the last steps
+    train_psnr: float | None  # dB, of the held-out pixels at the end
+    held_out: str  # what these are
+    warnings: tuple[str, ...]
+
+
+def unwatched(curve: list[Snapshot]) -> None:
+    """Nobody looks at the curve while it grows."""
 
 
 def optimise_scene(
@@ -61,6 +72,8 @@ def optimise_scene(
     before: Seconds,
     workspace: Path,
     progress: Callable[[float, str], None],
+    watch: Callable[[list[Snapshot]], None] = unwatched,
+    clock: TrainingClock | None = None,
 ) -> OptimisationResult:
     """Train the fields of a scene; resume from the workspace's checkpoint if there is one.
 
@@ -70,12 +83,16 @@ def optimise_scene(
     Args:
         before: training clock of the stages so far.
         workspace: folder that survives a kill.
+        watch: is given all snapshots so far whenever there is a new one.
+        clock: of this stage; it must have been started just now.
 
     Raises:
+        InputError: a train_psnr to reach, on a scene without any mask to measure it on.
         TrainingDiverged: after too many non-finite steps.
 
     Source: MoCo-Flow sec. 3.4, third stage.
     """
+    clock = clock or TrainingClock()
     torch.manual_seed(seed)
     field = shape.build(density.prior())
     _freeze_what_is_not_needed(field, learned)
@@ -85,13 +102,31 @@ def optimise_scene(
     objective = Objective(
         field, moments, weights, sampling, shape.shell_width_m, learned.motion_residual
     )
-    pixels = TrainingPixels(clip, body, shape.shell_width_m)
+    with clock.paused():
+        held_out = draw_held_out(clip, schedule.held_out_pixels)
+        _require_pixels_to_score(held_out, schedule)
+        score = None
+        if held_out is not None:
+            score = HeldOutScore.prepare(clip, held_out, motion, shape, field, sampling)
+    pixels = TrainingPixels(clip, body, shape.shell_width_m, held_out)
     workspace.mkdir(parents=True, exist_ok=True)
     write_scene_parts(workspace, shape, density, motion)
-    run = TrainingRun(field, objective, pixels, schedule, seed, before, workspace, progress)
+    run = TrainingRun(
+        field,
+        objective,
+        pixels,
+        schedule,
+        seed,
+        before,
+        workspace,
+        progress,
+        watch,
+        score,
+        clock,
+    )
     run.run()
     save_file(field.state_dict(), workspace / "model.safetensors")
-    result = _result(run.progress, run.recent_losses)
+    result = _result(run, before, held_out)
     (workspace / "result.json").write_text(json.dumps(asdict(result)))
     run.forget_checkpoint()
     return result
@@ -111,13 +146,48 @@ def _freeze_what_is_not_needed(field: SceneField, learned: Learned) -> None:
     field.appearance.requires_grad_(learned.appearance_codes)
 
 
-def _result(progress: Progress, losses: dict[str, float]) -> OptimisationResult:
+def _require_pixels_to_score(held_out: HeldOutPixels | None, schedule: ScheduleConfig) -> None:
+    if held_out is None and schedule.until_train_psnr is not None:
+        raise InputError(
+            "a train camera with masks for --until train_psnr",
+            "no mask that shows the person",
+            "Leave --until out, or add masks.",
+        )
+
+
+def _result(
+    run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None
+) -> OptimisationResult:
+    progress = run.progress
+    train_psnr = read_snapshots(run.workspace)[-1].train_psnr
     return OptimisationResult(
-        progress.steps,
+        progress.step,
+        progress.rays,
         progress.threads,
         progress.tries,
         progress.elapsed.wall,
         progress.elapsed.cpu,
         [asdict(event) for event in progress.events],
-        losses,
+        run.recent_losses,
+        train_psnr,
+        held_out.description if held_out else "",
+        _warnings(progress, train_psnr, before, run.schedule),
     )
+
+
+def _warnings(
+    progress: Progress, train_psnr: float | None, before: Seconds, schedule: ScheduleConfig
+) -> tuple[str, ...]:
+    """What the run could not keep of what was asked for."""
+    budget_s, target = schedule.budget_s, schedule.until_train_psnr
+    warnings = []
+    if progress.step == 0 and budget_s is not None:
+        warnings.append(
+            f"the scene is untrained: its preparation took {(before + progress.elapsed).wall:.1f} s"
+            f" of a budget of {budget_s:g} s"
+        )
+    if target is not None and not progress.reached:
+        warnings.append(
+            f"train_psnr is {train_psnr:.1f} dB, not {target:g}, at the end of the schedule"
+        )
+    return tuple(warnings)

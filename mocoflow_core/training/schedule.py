@@ -1,4 +1,4 @@
-"""How many steps, with which rates, how coarse: everything that changes with the step."""
+"""How many steps, with which rates, how coarse: what changes while the optimisation goes on."""
 
 from __future__ import annotations
 
@@ -19,6 +19,22 @@ class ScheduleConfig(ConfigurationPart):
     rate_motion: float = Field(1e-3, gt=0, description="residual motion and its codes")
     final_rate: float = Field(0.1, gt=0, le=1, description="last rate as a share of the first")
     budget_s: float | None = Field(None, gt=0, description="seconds of the training clock in all")
+    # On synthetic scenes twice the steps or twice the rays brought 0.06 dB and -0.2 dB at unseen
+    # views, four times the steps -0.2 dB: a larger budget is given back.
+    longest: float = Field(
+        1.0, ge=1, description="a budget may lengthen the schedule to so many times its steps"
+    )
+    fewest_steps: int = Field(
+        300, ge=1, description="a budget that leaves fewer steps than this gets fewer rays a step"
+    )
+    fewest_rays: int = Field(192, ge=1, description="of one step, under any budget")
+    until_train_psnr: float | None = Field(
+        None, gt=0, le=99, description="dB of held-out train pixels at which the run may stop"
+    )
+    until_every: int = Field(25, ge=1, description="steps from one look at that score to the next")
+    held_out_pixels: int = Field(
+        2048, ge=1, description="pixels of the train camera, kept out of training, for train_psnr"
+    )
     checkpoint_every_s: float = Field(5.0, gt=0, description="a kill loses at most this much work")
     threads: int | None = Field(None, ge=1, description="forced; otherwise chosen by a probe")
 
@@ -26,16 +42,20 @@ class ScheduleConfig(ConfigurationPart):
     def joint_steps(self) -> int:
         return self.coarse_steps + self.fine_steps
 
+    @property
+    def coarse_share(self) -> float:
+        """The part of the schedule in which the bands fade in."""
+        return self.coarse_steps / max(self.joint_steps, 1)
 
-def rate_factor(step: int, steps: int, final_rate: float) -> float:
-    """Exponential decay from 1 at the first step to ``final_rate`` at the last."""
-    return final_rate ** (step / max(steps - 1, 1))
+
+def rate_factor(share: float, final_rate: float) -> float:
+    """Exponential decay from 1 at the first step (share 0) to ``final_rate`` at the last (1)."""
+    return final_rate**share
 
 
-def band_alpha(step: int, steps: int, coarse_share: float, bands: int) -> float:
+def band_alpha(share: float, coarse_share: float, bands: int) -> float:
     """``bands * n / N`` over the coarse part of the schedule, then all bands.
 
     Source: MoCo-Flow sec. 3.3.
     """
-    coarse = coarse_share * steps
-    return bands * min(step / coarse, 1.0) if coarse > 0 else float(bands)
+    return bands * min(share / coarse_share, 1.0) if coarse_share > 0 else float(bands)

@@ -12,7 +12,7 @@ from mocoflow_core.body.light import LightConfig, measure_light
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.planning.plan import PlanConfig
+from mocoflow_core.planning.configuration import PlanConfig
 from tests.capsule_person import capsule_person, look_at
 
 FRAMES = 12

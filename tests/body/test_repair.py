@@ -7,9 +7,10 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from mocoflow_core.body.mask_misfit import expected_share
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
-from mocoflow_core.body.repair import RepairConfig, RoundsConfig, repair_body
+from mocoflow_core.body.repair import RepairConfig, RoundsConfig, outlines_apart, repair_body
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.geometry.camera import Camera
@@ -76,8 +77,14 @@ def twisted(meshes: MeshSequence, angles: np.ndarray) -> MeshSequence:
     return replace(meshes, vertices=np.asarray(turned, np.float32))
 
 
+def silent(fraction: float, what: str) -> None:
+    """Progress that nobody watches."""
+
+
 def fitted(clip: Clip, meshes: MeshSequence) -> np.ndarray:
-    return repair_body(clip, meshes, CONFIGURATION, lambda fraction, text: None).vertices
+    apart_px = outlines_apart(clip, meshes, CONFIGURATION)
+    expected = expected_share(apart_px, CONFIGURATION.masks)
+    return repair_body(clip, meshes, expected, CONFIGURATION, silent).vertices
 
 
 @pytest.fixture(scope="module")
@@ -164,8 +171,10 @@ def test_an_estimate_that_counts_as_agreeing_is_left_as_it_came(
     truth: MeshSequence, bent: MeshSequence
 ) -> None:
     masks = CONFIGURATION.masks.model_copy(update={"agreeing_px": 1e6})
-    trusting = CONFIGURATION.model_copy(update={"masks": masks})
-    assert repair_body(filmed(truth), bent, trusting, lambda fraction, text: None) is bent
+    apart_px = outlines_apart(filmed(truth), bent, CONFIGURATION)
+    assert apart_px > CONFIGURATION.masks.agreeing_px
+    assert expected_share(apart_px, masks) == 0
+    assert repair_body(filmed(truth), bent, 0.0, CONFIGURATION, silent) is bent
 
 
 def test_colours_find_the_twist_that_outlines_do_not_show(
@@ -187,7 +196,7 @@ def test_colours_find_the_twist_that_outlines_do_not_show(
 
     long = CONFIGURATION.model_copy(update={"by_both": RepairConfig().by_both})
     by_masks, by_both = (
-        repair_body(clip, wrong, configuration, lambda fraction, text: None).vertices
+        repair_body(clip, wrong, 1.0, configuration, silent).vertices
         for configuration in (blind, long)
     )
     assert twist(by_masks) > 0.5 * twist(wrong.vertices)

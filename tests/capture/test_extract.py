@@ -12,7 +12,12 @@ from PIL import Image
 
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.capture.extract import CaptureConfig, extract_clip, extract_evaluation
+from mocoflow_core.capture.extract import (
+    CaptureConfig,
+    ClipNeeds,
+    extract_clip,
+    extract_evaluation,
+)
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.video import write_video
@@ -228,3 +233,34 @@ def test_a_longer_clip_costs_no_more_frames_in_memory(tmp_path):
     recipe = replace(default_recipe(), meshes=walking(60), cameras=camera, fps=120.0)
     clip = extracted(write_scene(tmp_path, recipe))
     assert len(clip.frames) == 6 + 5
+
+
+def test_a_plate_that_is_asked_for_is_made_though_one_is_given(folder):
+    cv2.imwrite(str(folder / "background/cam00.png"), np.zeros((96, 64, 3), np.uint8))
+    scene = open_scene(folder)
+    given = extract_clip(scene, CaptureConfig())
+    made = extract_clip(scene, CaptureConfig(), ClipNeeds(background=True))
+    assert given.background.max() == 0
+    visible = ~made.masks.any(axis=0)
+    assert np.array_equal(made.background[visible], room(64, 96, 0)[visible])
+
+
+def test_masks_that_are_asked_for_are_made_though_some_are_given(folder):
+    for path in (folder / "masks/cam00").iterdir():
+        cv2.imwrite(str(path), np.full((96, 64), 255, np.uint8))
+    scene = open_scene(folder)
+    assert extract_clip(scene, CaptureConfig()).masks.all()
+    made = extract_clip(scene, CaptureConfig(), ClipNeeds(masks=True))
+    meshes = default_recipe().meshes
+    truth = silhouettes(meshes.vertices, meshes.faces, made.camera)
+    assert overlap(made.masks, truth).min() > 0.9
+
+
+def test_a_frame_that_is_shown_twice_is_worked_on_once(folder):
+    for kind in ("frames", "masks"):
+        files = sorted((folder / kind / "cam00").iterdir())
+        files[3].write_bytes(files[2].read_bytes())
+    scene = open_scene(folder)
+    assert extract_clip(scene, CaptureConfig()).frame_indices.tolist() == [0, 1, 2, 4, 5]
+    kept = extract_clip(scene, CaptureConfig(), ClipNeeds(repeated_frames=True))
+    assert kept.frame_indices.tolist() == [0, 1, 2, 3, 4, 5]

@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from flows.command_line import main
+from tests.flows.stages import STAGES
 
 ROOT = Path(__file__).parents[2]
 
@@ -130,6 +131,25 @@ def test_a_scene_that_is_not_there_is_refused(refuse, tmp_path):
 def test_a_preset_that_does_not_exist_is_refused(refuse, toy_scene, tmp_path):
     refuse(
         "reconstruct", toy_scene, "--preset", "fats", "--out", tmp_path / "out", because="fast, toy"
+    )
+
+
+@pytest.mark.parametrize(
+    ("condition", "because"),
+    [
+        ("30", "train_psnr=DECIBELS"),
+        ("train_psnr", "train_psnr=DECIBELS"),
+        ("psnr=30", "only pixels of the train camera"),
+        ("train_psnr=much", "decibels above 0"),
+        ("train_psnr=-3", "decibels above 0"),
+        ("train_psnr=nan", "decibels above 0"),
+        ("train_psnr=300", "schedule.until_train_psnr"),
+    ],
+)
+def test_a_score_that_cannot_be_reached_is_refused(refuse, toy_scene, tmp_path, condition, because):
+    refuse(
+        *("reconstruct", toy_scene, "--out", tmp_path / "out", "--until", condition),
+        because=because,
     )
 
 
@@ -264,3 +284,19 @@ def test_a_view_that_cannot_be_is_refused(refuse, first_run, tmp_path, option, v
 
 def test_rendering_a_folder_without_a_run_is_refused(refuse, tmp_path):
     refuse("render", tmp_path, "--out", tmp_path / "views", because="run.json")
+
+
+def test_a_plan_prepares_a_scene_for_the_run_that_follows(toy_scene, reconstruct, tmp_path):
+    store = tmp_path / "store"
+    run = mocoflow("plan", toy_scene, "--preset", "toy", "--store", store)
+    assert run.returncode == 0, run.stderr
+    for words in ("What the preparation needs", "What the optimisation needs", "motion residual"):
+        assert words in run.stdout
+    record = reconstruct(toy_scene, tmp_path / "out", store=str(store))
+    before = [stage for stage in record.stages if stage.cached]
+    assert [stage.name for stage in before] == STAGES[: STAGES.index("optimise_scene")]
+
+
+def test_a_plan_refuses_what_a_reconstruction_refuses(refuse, toy_scene, tmp_path):
+    refuse("plan", toy_scene, "--set", "plan.motion_residue=off", because="plan.motion_residual")
+    refuse("plan", tmp_path / "nothing", because="scene.json")

@@ -67,9 +67,19 @@ def test_the_training_side_does_not_see_it(
     assert parameters(changed) == parameters(undisturbed)
 
 
+def test_a_score_that_ends_a_run_is_not_of_another_camera(scene, toy_scene, reconstruct, tmp_path):
+    """Stopping at a score of another camera would be learning from it."""
+    asked = {"until": "train_psnr=20", "settings": ("schedule.until_every=1",)}
+    undisturbed = reconstruct(toy_scene, tmp_path / "first", **asked)
+    replace_by_noise(scene)
+    changed = reconstruct(scene, tmp_path / "out", store=str(tmp_path / "fresh"), **asked)
+    assert not changed.stage("optimise_scene").cached
+    assert parameters(changed) == parameters(undisturbed)
+
+
 def test_what_the_metrics_read_does_change(scene, toy_scene, tmp_path):
     def others(path):
-        return Request(scene_path=path, out=tmp_path / "out").others.digest
+        return Request(scene_path=path).others.digest
 
     assert others(scene) == others(toy_scene)
     replace_by_noise(scene)

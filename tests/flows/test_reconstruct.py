@@ -7,30 +7,19 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
 
 from mocoflow_core.artifacts import SceneArtifact
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.io.content_key import digest_file
 from mocoflow_core.io.run_folder import read_run
 from mocoflow_core.io.store import Store
-from mocoflow_core.metrics.curve import read_curve
+from mocoflow_core.metrics.curve import CLOCKED_STAGES, read_curve
 from mocoflow_core.metrics.table import read_scores
-
-STAGES = [
-    "extract_clip",
-    "ingest_meshes",
-    "inspect_scene",
-    "repair_body",
-    "plan_scene",
-    "pretrain_density",
-    "fit_motion",
-    "optimise_scene",
-    "extract_evaluation",
-    "render_views",
-    "score_views",
-    "write_report",
-]
+from tests.flows.stages import STAGES
 
 
 def test_a_run_leaves_everything_that_a_user_keeps(first_run):
@@ -57,6 +46,49 @@ def test_the_training_clock_of_the_curve_starts_after_the_preparation(first_run)
     curve = read_curve(out / "error_curve.parquet")
     assert min(row.wall_s for row in curve if row.method == "mocoflow") > spent
     assert {row.method for row in curve} == {"mocoflow", "posed_mesh"}
+
+
+def test_the_curve_has_the_score_of_held_out_train_pixels_at_each_kept_state(first_run):
+    out, _ = first_run
+    curve = [row for row in read_curve(out / "error_curve.parquet") if row.method == "mocoflow"]
+    steps = {m: [r.step for r in curve if r.metric == m] for m in ("train_psnr", "psnr_union")}
+    assert steps["train_psnr"] == steps["psnr_union"]
+    assert all(row.value > 0 for row in curve if row.metric == "train_psnr")
+
+
+def test_the_run_s_page_shows_every_point_of_that_curve(first_run):
+    out, _ = first_run
+    curve = read_curve(out / "error_curve.parquet")
+    rows = [
+        f"| {row.wall_s:.1f} | {row.cpu_s:.1f} | {row.step} | {row.value:.2f} |"
+        for row in curve
+        if row.metric == "train_psnr"
+    ]
+    wanted = ArtifactFilter(key=ArtifactFilterKey(any_=["train-psnr"]))
+    shown = get_client(sync_client=True).read_artifacts(artifact_filter=wanted)
+    assert any(artifact.data.splitlines()[2:] == rows for artifact in shown)
+
+
+def test_a_budget_below_the_preparation_ends_with_a_warning_and_a_scene(
+    reconstruct, toy_scene, tmp_path
+):
+    record = reconstruct(toy_scene, tmp_path / "out", budget_s=0.01)
+    assert any("untrained" in warning for warning in record.warnings)
+    assert "untrained" in (tmp_path / "out" / "report.html").read_text()
+    assert "psnr_union" in record.scores["mocoflow"]["cam01"]
+
+
+def test_the_recorded_seconds_of_the_optimisation_are_those_of_the_training_clock(first_run):
+    """Without the looks at the curve; opening its inputs and committing take little."""
+    out, record = first_run
+    stages = [stage for stage in record.stages if stage.name in CLOCKED_STAGES]
+    last = max(row.wall_s for row in read_curve(out / "error_curve.parquet"))
+    assert sum(stage.wall_s for stage in stages) == pytest.approx(last, abs=1.0)
+
+
+def test_the_machine_is_the_one_that_optimised(first_run):
+    _, record = first_run
+    assert set(record.machine) >= {"cores", "model", "load", "threads"}
 
 
 def test_a_second_run_computes_nothing_and_leaves_the_same(first_run, reconstruct, toy_scene):
@@ -111,3 +143,14 @@ def test_a_black_frame_and_a_frozen_mesh_are_named_in_the_record(reconstruct, to
     assert any("frame 5 of cam00 left out" in words for words in record.warnings)
     assert any("does not move in 4 frames (1-4)" in words for words in record.warnings)
     assert "left out: more than" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_the_run_s_page_has_the_plan_as_a_table(first_run):
+    out, _ = first_run
+    decided = json.loads((out / "plan.json").read_text())["decisions"]
+    wanted = ArtifactFilter(key=ArtifactFilterKey(any_=["plan"]))
+    (shown, *_) = get_client(sync_client=True).read_artifacts(artifact_filter=wanted)
+    rows = json.loads(shown.data)
+    names = [decision["name"].replace("_", " ") for decision in decided]
+    assert [row["name"] for row in rows] == [*names, "evaluation cameras"]
+    assert {row["part"] for row in rows} == {"preparation", "optimisation", "scoring"}

@@ -180,3 +180,16 @@ def test_boxes_contain_every_node():
     positions = node_positions(lattice, [1.0, -2.0, 0.0])
     assert torch.equal(positions.amin(0), lower[0])
     assert torch.equal(positions.amax(0), upper[0])
+
+
+def test_grids_that_are_shared_answer_like_the_one_they_are():
+    shape = torch.tensor([[2, 2, 2]])
+    numbers = torch.arange(8, dtype=torch.int32)
+    one = SparseGrids(torch.zeros(1, 3), shape, torch.zeros(1, dtype=torch.int64), numbers, 1.0)
+    points = torch.rand(20, 3, generator=torch.Generator().manual_seed(0))
+    nodes, weights = one.corners(points, torch.zeros(20, dtype=torch.int64))
+    shared = one.shared_by(4)
+    assert shared.count == 4
+    of_any, weights_of_any = shared.corners(points, torch.arange(20) % 4)
+    assert torch.equal(of_any, nodes)
+    assert torch.equal(weights_of_any, weights)

@@ -8,29 +8,42 @@ import numpy as np
 import pytest
 
 from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.body.repair import RepairConfig, RoundsConfig
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.inspection import inspect_scene
-from mocoflow_core.planning.plan import (
-    PlanConfig,
-    ScenePlan,
-    decide_evaluation,
+from mocoflow_core.planning.plan import ScenePlan, plan_scene
+from mocoflow_core.planning.preparation import (
+    decide_background,
+    decide_frames,
     decide_location,
-    plan_scene,
+    decide_preparation,
+    decide_segmentation,
 )
+from mocoflow_core.planning.repair import repair_where_needed
+from mocoflow_core.planning.scoring import decide_evaluation
 from tests.capsule_person import capsule_person, default_recipe, edit_description, write_scene
 
 DECISIONS = [
     "background_extraction",
     "mask_segmentation",
     "location_search",
+    "repeated_frames",
+    "body_repair",
     "motion_fields",
     "motion_residual",
     "motion_consensus",
     "appearance_codes",
     "fixed_light",
+    "wide_shell",
+    "fine_detail",
 ]
+
+
+ROUND = RoundsConfig(rounds=1, steps=1, rate=0.1, outlier_m=(0.08, 0.02))
+QUICK = RepairConfig(by_masks=ROUND, by_both=ROUND)
 
 
 def planned(folder, change_meshes=lambda meshes: meshes, change_clip=lambda clip: clip, **config):
@@ -38,7 +51,13 @@ def planned(folder, change_meshes=lambda meshes: meshes, change_clip=lambda clip
     ingested = ingest_meshes(scene)
     clip = change_clip(extract_clip(scene, CaptureConfig()))
     meshes = change_meshes(ingested.meshes)
-    return plan_scene(clip, meshes, inspect_scene(scene, ingested), PlanConfig(**config))
+    chosen = PlanConfig(**config)
+    preparation = (
+        *decide_preparation(inspect_scene(scene, ingested), chosen),
+        decide_frames(0, len(clip.frames), chosen),
+        repair_where_needed(clip, meshes, QUICK, chosen.body_repair, lambda share, text: None)[1],
+    )
+    return plan_scene(clip, meshes, preparation, chosen)
 
 
 @pytest.fixture
@@ -189,3 +208,61 @@ def test_other_cameras_decide_about_scores_and_nothing_else(folder):
     edit_description(folder, lambda d: d["cameras"].pop("cam01"))
     assert not decide_evaluation(open_scene(folder)).needed
     assert planned(folder) == before
+
+
+@pytest.mark.parametrize("force", ["auto", "on", "off"])
+def test_the_shell_is_the_narrowest_where_a_wide_one_is_not_needed(folder, force):
+    config = PlanConfig()
+    width = planned(folder, wide_shell=force).shell_width_m
+    assert width == (config.widest_shell_m if force == "on" else config.narrowest_shell_m)
+
+
+def test_cells_and_steps_are_as_coarse_as_pixels_where_these_show_no_more(folder):
+    plan = planned(folder)
+    pixel_m = plan.decision("fine_detail").evidence["pixel_m"]
+    assert not plan.needs("fine_detail")
+    assert plan.no_finer(0.01) == pytest.approx(0.5 * pixel_m)
+    assert plan.no_finer(1.0) == 1.0
+    assert planned(folder, fine_detail="on").no_finer(0.01) == 0.01
+    sharp = planned(folder, detail_px=0.1)
+    assert sharp.needs("fine_detail")
+    assert sharp.no_finer(0.01) == 0.01
+
+
+def test_an_estimate_off_the_masks_is_repaired_and_an_exact_one_left_alone(folder):
+    scene = open_scene(folder)
+    clip, exact = extract_clip(scene, CaptureConfig()), ingest_meshes(scene).meshes
+
+    def repaired(meshes, force="auto"):
+        return repair_where_needed(clip, meshes, QUICK, force, lambda share, text: None)
+
+    meshes, decision = repaired(exact)
+    assert meshes is exact
+    assert not decision.needed
+    meshes, decision = repaired(bent(exact))
+    assert decision.needed
+    assert decision.evidence["apart_px"] > decision.threshold
+    for force, touched in (("on", True), ("off", False)):
+        for given in (exact, bent(exact)):
+            meshes, decision = repaired(given, force)
+            assert decision.needed == touched
+            assert (meshes is not given) == touched
+
+
+def test_what_the_files_do_not_bring_cannot_be_left_out(tmp_path):
+    folder = write_scene(tmp_path / "a", replace(default_recipe(16), background=False))
+    inspection = inspect_scene(open_scene(folder), None)
+    with pytest.raises(InputError, match="background_extraction"):
+        decide_background(inspection, PlanConfig(background_extraction="off"))
+    folder = write_scene(tmp_path / "b", replace(default_recipe(), masks=False))
+    inspection = inspect_scene(open_scene(folder), None)
+    with pytest.raises(InputError, match="mask_segmentation"):
+        decide_segmentation(inspection, PlanConfig(mask_segmentation="off"))
+
+
+def test_repeated_frames_are_counted_in_the_evidence():
+    decision = decide_frames(3, 9, PlanConfig())
+    assert not decision.needed
+    assert decision.reason == "3 of 12 frames repeat another one"
+    assert decision.evidence == {"repeated": 3.0, "kept": 9.0}
+    assert decide_frames(0, 12, PlanConfig(repeated_frames="on")).needed

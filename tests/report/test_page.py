@@ -104,6 +104,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> ReportInputs:
         turntable=root / "turntable.mp4",
         warnings=["the height of 2.4 m is unusual"],
         guard_events=["step 12 refused"],
+        held_out="640 pixels of 8 held-out frames of cam00",
     )
 
 
@@ -152,6 +153,7 @@ def test_every_part_of_a_whole_run_is_on_the_page(inputs: ReportInputs, tmp_path
         "1 min 12 s",
         "unusual",
         "step 12 refused",
+        "640 pixels of 8 held-out frames of cam00",
         "Turntable",
         "Did the optimisation repair",
         "&#34;rays&#34;: 64",

@@ -38,10 +38,13 @@ class Run:
 PROGRESS = Progress(
     threads=2,
     steps=50,
+    rays=512,
+    started_s=0.75,
     step=20,
-    snapshots=3,
     rate_scale=0.25,
     elapsed=Seconds(12.5, 20.25),
+    snapshot_s=8.25,
+    reached=True,
     events=[GuardEvent(7, "loss photometric is nan")],
     tries=2,
 )
@@ -84,7 +87,7 @@ def test_a_half_written_checkpoint_leaves_the_old_one(tmp_path):
 def test_the_last_of_many_checkpoints_counts_and_leaves_no_litter(tmp_path):
     run = Run(0)
     for step in (1, 2, 3):
-        save_checkpoint(tmp_path, Progress(threads=1, steps=9, step=step), *run.parts)
+        save_checkpoint(tmp_path, Progress(threads=1, steps=9, rays=8, step=step), *run.parts)
     assert load_checkpoint(tmp_path, *run.parts).step == 3
     assert len(list(tmp_path.iterdir())) == 1
 

@@ -43,7 +43,7 @@ def test_meshes_are_joined_by_frame_number_not_by_row(prepared):
         meshes.faces,
         meshes.keypoint_regressor,
     )
-    again = fit_motion(prepared.clip, padded, prepared.density, SHELL_M, MOTION)
+    again = fit_motion(prepared.clip, padded, prepared.density, SHELL_M, True, MOTION)
     assert np.array_equal(again.controls.observed, prepared.motion.controls.observed)
 
 
@@ -65,3 +65,28 @@ def test_the_saved_density_is_the_same_density(prepared, tmp_path):
     for name in ("vertices", "faces", "lattice", "origin"):
         assert np.array_equal(getattr(loaded, name), getattr(prepared.density, name))
     assert loaded.spacing == prepared.density.spacing
+
+
+def test_a_body_that_stands_still_has_one_table_that_serves_every_frame(prepared):
+    clip = prepared.clip
+    still = fit_motion(clip, prepared.meshes, prepared.density, SHELL_M, False, MOTION)
+    body, count = still.body, int((~clip.held_out).sum())
+    assert body.times.tolist() == prepared.motion.body.times.tolist()
+    assert body.observed_grids.count == count
+    # Lattices of single frames differ in size by how far the limbs are spread.
+    assert len(body.observed_maps) < 1.5 / count * len(prepared.motion.body.observed_maps)
+    points = torch.from_numpy(prepared.density.vertices)
+    for row in range(count):
+        frame = torch.full((len(points),), row)
+        for moved, known in (body.to_canonical(points, frame), body.to_observed(points, frame)):
+            assert known.all()
+            # The identity up to the rounding of float32 metres.
+            assert torch.allclose(moved, points, atol=1e-5)
+    assert still.fit.to_canonical_mm < 0.01
+
+
+def test_the_shared_tables_survive_being_saved(prepared, tmp_path):
+    start = fit_motion(prepared.clip, prepared.meshes, prepared.density, SHELL_M, False, MOTION)
+    start.save(tmp_path)
+    ours, theirs = start.body.tensors(), MotionStart.load(tmp_path).body.tensors()
+    assert all(torch.equal(ours[name], theirs[name]) for name in ours)

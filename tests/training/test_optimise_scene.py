@@ -12,11 +12,16 @@ from safetensors.torch import load_file, save_file
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.losses.weights import LossConfig
+from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training import loop
 from mocoflow_core.training.checkpoint import read_metadata
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.guard import TrainingDiverged
 from mocoflow_core.training.optimise_scene import Learned
+from mocoflow_core.training.schedule import ScheduleConfig
+from mocoflow_core.training.snapshots import read_snapshots, snapshot_weights
 from tests.toy_training import SCHEDULE, Prepared, train
+from tests.training.slow_clock import SlowClock
 
 CAREFUL = SCHEDULE.model_copy(update={"checkpoint_every_s": 1e-9})
 
@@ -129,18 +134,132 @@ def test_held_out_frames_do_not_reach_the_parameters(prepared, trained, tmp_path
     assert_same(trained, tmp_path)
 
 
-def test_a_budget_shortens_the_schedule(prepared, tmp_path):
-    long = SCHEDULE.model_copy(
-        update={"coarse_steps": 60_000, "fine_steps": 40_000, "budget_s": 2.0}
-    )
-    result = train(prepared, tmp_path, schedule=long)
-    assert 1 < result.steps < 2000
+LONG = SCHEDULE.model_copy(update={"coarse_steps": 60_000, "fine_steps": 40_000})
+
+
+def with_budget(seconds: float, schedule: ScheduleConfig = LONG) -> ScheduleConfig:
+    return schedule.model_copy(update={"budget_s": seconds})
+
+
+def test_a_budget_ends_on_time_with_the_preparation_on_the_clock(prepared, tmp_path):
+    # Each look at this clock costs 50 ms, and each step looks once: some 60 steps in 3 s.
+    clock = TrainingClock(now=SlowClock(per_look=0.05))
+    result = train(prepared, tmp_path, schedule=with_budget(5.0), before=Seconds(2.0), clock=clock)
+    assert result.wall_s == pytest.approx(3.0, abs=0.15)
+    assert 40 < result.steps <= 60
     assert (tmp_path / "model.safetensors").exists()
+    assert result.warnings == ()
 
 
-def test_a_generous_budget_changes_nothing(prepared, trained, tmp_path):
-    train(prepared, tmp_path, schedule=SCHEDULE.model_copy(update={"budget_s": 1e6}))
+def test_a_budget_holds_when_the_machine_gets_slower_on_the_way(prepared, tmp_path):
+    machine = SlowClock(per_look=0.04)
+
+    def slower(fraction: float, text: str) -> None:
+        machine.per_look = 0.04 if fraction < 0.5 else 0.2
+
+    result = train(
+        prepared,
+        tmp_path,
+        schedule=with_budget(4.0),
+        progress=slower,
+        clock=TrainingClock(now=machine),
+    )
+    assert result.wall_s == pytest.approx(4.0, abs=0.2)
+    # Both halves of the time are used: some 50 steps and 10.
+    assert 45 < result.steps < 70
+
+
+def test_a_killed_run_with_a_budget_still_ends_on_time(prepared, tmp_path):
+    schedule = with_budget(3.0).model_copy(update={"checkpoint_every_s": 0.5})
+
+    def killed(fraction: float, text: str) -> None:
+        if fraction > 0.5:
+            raise Killed
+
+    with pytest.raises(Killed):
+        clock = TrainingClock(now=SlowClock(per_look=0.05))
+        train(prepared, tmp_path, schedule=schedule, progress=killed, clock=clock)
+    clock = TrainingClock(now=SlowClock(per_look=0.05))
+    result = train(prepared, tmp_path, schedule=schedule, clock=clock)
+    assert result.tries == 2
+    assert result.wall_s == pytest.approx(3.0, abs=0.15)
+
+
+def test_a_budget_below_the_preparation_leaves_the_start_scene_and_says_so(prepared, tmp_path):
+    result = train(prepared, tmp_path, schedule=with_budget(5.0), before=Seconds(12.0))
+    assert result.steps == 0
+    start = prepared.field(seed=0).state_dict()
+    assert all(torch.equal(start[name], value) for name, value in parameters(tmp_path).items())
+    assert "untrained" in result.warnings[0]
+    assert "12." in result.warnings[0]
+    assert len(read_snapshots(tmp_path)) == 1
+    opened = TrainedScene.open(tmp_path)
+    rgb, opacity = opened.render(prepared.clip.camera, 0.5)
+    assert np.isfinite(rgb).all()
+    assert opacity.max() > 0.5
+
+
+def test_a_generous_budget_makes_the_longest_schedule(prepared, trained, tmp_path):
+    whole = with_budget(1e6, SCHEDULE).model_copy(update={"longest": 1.0})
+    train(prepared, tmp_path, schedule=whole)
     assert_same(trained, tmp_path)
+    longer = whole.model_copy(update={"longest": 1.6})
+    assert train(prepared, tmp_path / "longer", schedule=longer).steps == 40
+
+
+def until(decibels: float, **changes) -> ScheduleConfig:
+    update = {"until_train_psnr": decibels, "until_every": 5, **changes}
+    return SCHEDULE.model_copy(update=update)
+
+
+def test_a_run_stops_at_the_first_look_at_which_the_score_is_reached(prepared, trained, tmp_path):
+    target = read_snapshots(trained)[-1].train_psnr - 1.0
+    result = train(prepared, tmp_path, schedule=until(target))
+    assert result.steps < SCHEDULE.joint_steps
+    assert result.steps % 5 == 0
+    assert result.train_psnr >= target
+    assert result.warnings == ()
+
+
+def test_a_score_that_is_not_reached_ends_with_the_schedule_and_says_so(prepared, tmp_path):
+    result = train(prepared, tmp_path, schedule=until(98.0))
+    assert result.steps == SCHEDULE.joint_steps
+    assert "not 98, at the end" in result.warnings[0]
+
+
+def test_a_killed_run_stops_at_the_step_of_an_undisturbed_one(prepared, tmp_path):
+    schedule = until(18.0, coarse_steps=100, checkpoint_every_s=1e-9)
+    undisturbed = train(prepared, tmp_path / "undisturbed", schedule=schedule)
+    assert 10 < undisturbed.steps < 110
+
+    def killed(fraction: float, text: str) -> None:
+        raise Killed
+
+    with pytest.raises(Killed):
+        train(prepared, tmp_path / "killed", schedule=schedule, progress=killed)
+    assert train(prepared, tmp_path / "killed", schedule=schedule).steps == undisturbed.steps
+    assert_same(tmp_path / "killed", tmp_path / "undisturbed")
+
+
+def test_looking_at_the_score_changes_no_parameter_and_costs_no_training_time(
+    prepared, trained, tmp_path
+):
+    machine, pauses = SlowClock(), []
+
+    def looked(curve) -> None:
+        machine.spend(1000.0)
+
+    clock = TrainingClock(lambda wall_s, cpu_s: pauses.append(wall_s), machine)
+    result = train(prepared, tmp_path, schedule=until(98.0), watch=looked, clock=clock)
+    assert_same(trained, tmp_path)
+    assert result.wall_s == 0.0
+    assert sum(pauses) == 1000.0
+
+
+def test_a_score_to_reach_needs_a_mask(prepared, tmp_path):
+    blind = replace(prepared.clip, masks=np.zeros_like(prepared.clip.masks))
+    with pytest.raises(InputError, match="mask"):
+        train(replace(prepared, clip=blind), tmp_path, schedule=until(20.0))
 
 
 def test_what_is_not_needed_is_not_learned(prepared, tmp_path):
@@ -162,11 +281,22 @@ def test_a_weight_of_zero_leaves_its_loss_out(prepared, tmp_path):
 
 
 def test_snapshots_are_indexed_and_the_last_is_the_trained_scene(trained):
-    entries = json.loads((trained / "snapshots" / "snapshots.json").read_text())
-    assert entries[-1]["step"] == SCHEDULE.joint_steps
-    last = load_file(trained / "snapshots" / f"{SCHEDULE.joint_steps:06d}.safetensors")
+    taken = read_snapshots(trained)[-1]
+    assert taken.step == SCHEDULE.joint_steps
+    last = load_file(snapshot_weights(trained, taken))
     model = parameters(trained)
     assert all(torch.equal(last[name], model[name]) for name in model)
+
+
+def test_the_curve_grows_with_each_snapshot(prepared, tmp_path):
+    curves = []
+    clock = TrainingClock(now=SlowClock(per_look=0.2))
+    train(prepared, tmp_path, watch=lambda curve: curves.append(list(curve)), clock=clock)
+    assert [len(curve) for curve in curves] == list(range(1, len(curves) + 1))
+    assert len(curves) >= 3
+    assert curves[-1] == read_snapshots(tmp_path)
+    assert all(point.train_psnr > 0 for point in curves[-1])
+    assert curves[-1][-1].train_psnr > curves[-1][0].train_psnr
 
 
 def with_rate(rate: float):

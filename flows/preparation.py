@@ -1,0 +1,66 @@
+"""Everything before the optimisation: what both flows, plan and reconstruct, begin with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from flows.request import Request
+from mocoflow_core.artifacts import (
+    Artifact,
+    ClipArtifact,
+    DensityArtifact,
+    InspectionArtifact,
+    LocationArtifact,
+    MeshArtifact,
+    MotionArtifact,
+    PlanArtifact,
+    RepairArtifact,
+)
+from mocoflow_core.capture.extract import ClipNeeds
+from tasks.extract_clip import extract_clip
+from tasks.fit_motion import fit_motion
+from tasks.ingest_meshes import ingest_meshes
+from tasks.inspect_scene import inspect_scene
+from tasks.locate_body import locate_body
+from tasks.plan_scene import plan_scene
+from tasks.pretrain_density import pretrain_density
+from tasks.repair_body import repair_body
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """What the optimisation starts from, in the order in which it was made."""
+
+    given: MeshArtifact
+    inspection: InspectionArtifact
+    clip: ClipArtifact
+    bodies: MeshArtifact | LocationArtifact
+    repaired: RepairArtifact
+    plan: PlanArtifact
+    density: DensityArtifact
+    motion: MotionArtifact
+
+    @property
+    def stages(self) -> tuple[Artifact, ...]:
+        return tuple(getattr(self, field.name) for field in fields(self))
+
+
+def prepare(request: Request) -> Preparation:
+    """Run the stages before the optimisation, or find them in the store."""
+    where, chosen = request.store, request.configuration
+    given = ingest_meshes(where, request.recording, request.bodies)
+    inspection = inspect_scene(where, request.recording, given, chosen.plan)
+    needs = ClipNeeds(
+        background=inspection.holds("background_extraction"),
+        masks=inspection.holds("mask_segmentation"),
+        repeated_frames=chosen.plan.repeated_frames == "on",
+    )
+    clip = extract_clip(where, request.recording, chosen.capture, needs)
+    bodies = given
+    if inspection.holds("location_search"):
+        bodies = locate_body(where, clip, given, chosen.location)
+    repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
+    plan = plan_scene(where, clip, repaired, inspection, chosen.plan)
+    density = pretrain_density(where, repaired, plan, chosen.density)
+    motion = fit_motion(where, clip, repaired, plan, density, chosen.motion)
+    return Preparation(given, inspection, clip, bodies, repaired, plan, density, motion)
