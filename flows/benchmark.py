@@ -82,13 +82,13 @@ def benchmark(
 
 def run_cell(cell: Cell) -> CellRecord:
     """Run one cell as a flow run that carries its name, unless its folder is finished."""
-    record, request = cell
+    record, request, out = cell
     terminal_line(record.name)
     if not _is_finished(cell):
         named = reconstruct.with_options(flow_run_name=lambda: record.name)
         state = named(
             scene=request.scene_path,
-            out=request.out,
+            out=out,
             preset=request.preset,
             seed=request.seed,
             budget_s=request.budget_s,
@@ -99,7 +99,7 @@ def run_cell(cell: Cell) -> CellRecord:
         if not state.is_completed():
             ended = "cancelled" if state.is_cancelled() else "failed"
             return record.model_copy(update={"state": ended, "reason": _reason(state)})
-    return record.finished_as(read_run(request.out), request.out)
+    return record.finished_as(read_run(out), out)
 
 
 def _reason(state: State[RunRecord]) -> str:
@@ -116,6 +116,6 @@ def _reason(state: State[RunRecord]) -> str:
 
 def _is_finished(cell: Cell) -> bool:
     try:
-        return cell.request.claim().is_finished()
+        return cell.request.claim(cell.out).is_finished()
     except InputError:
         return False  # Its own flow run will say why.

@@ -24,10 +24,11 @@ from mocoflow_core.synthetic.catalogue import named_scene
 
 
 class Cell(NamedTuple):
-    """One run: where it is recorded, and what the flow is asked for."""
+    """One run: where it is recorded, what the flow is asked for, and where its results go."""
 
     record: CellRecord
     request: Request
+    out: Path
 
 
 class BenchmarkRequest(BaseModel):
@@ -113,14 +114,13 @@ class BenchmarkRequest(BaseModel):
         )
         request = Request(
             scene_path=path,
-            out=self.out / folder,
             preset=preset,
             seed=seed,
             budget_s=self.budget_s,
             settings=(*self.settings, *SETTINGS[method]),
             store_url=self.store_url,
         )
-        return Cell(record, request)
+        return Cell(record, request, self.out / folder)
 
     def _running(self) -> list[str]:
         """The methods that have runs of their own; the others are scored within those."""
