@@ -28,7 +28,7 @@ def extract_clip(
     return {
         "frames": len(clip.frame_indices),
         "repeated": len(extract.select_training_frames(scene, capture).all)
-        - len(clip.frame_indices),
+        - len(extracted.frame_indices),
         "held_out": int(clip.held_out.sum()),
         "first_frame": int(clip.frame_indices[0]),
         "last_frame": int(clip.frame_indices[-1]),

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 NOISE_RATIO = 1.2
 # And by this in any case, of 255: rounding, where there is no noise at all.
 ROUNDING = 0.25
+# A background that changes by more than noise does, of 255, is another picture: nothing repeats.
+LARGEST_NOISE = 8.0
 
 
 def repeated_frames(
@@ -42,4 +44,5 @@ def _shows_the_same(
     if not person.any():
         return bool(changes.mean() <= ROUNDING)
     noise = float(changes[~person].mean()) if not person.all() else 0.0
-    return bool(changes[person].mean() <= NOISE_RATIO * noise + ROUNDING)
+    still = noise <= LARGEST_NOISE
+    return bool(still and changes[person].mean() <= NOISE_RATIO * noise + ROUNDING)

@@ -73,3 +73,9 @@ def test_nobody_in_sight_is_compared_as_a_whole():
         True,
         False,
     ]
+
+
+def test_a_black_frame_repeats_nothing():
+    frames, masks = filmed([2] * 4)
+    frames[2] = 0
+    assert not repeated_frames(frames, masks, np.ones(4, bool))[2:].any()
