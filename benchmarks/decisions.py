@@ -52,9 +52,13 @@ FAR_AWAY = TURN.model_copy(update={"name": "turn_48px", "width": 48, "height": 4
 STUTTER = TURN.model_copy(update={"name": "turn_stutter", "frames": 12})
 SHOWN = {STUTTER.name: 4}
 # Another decision that would hide this one's effect.
-BESIDE = {"motion_fields": ("plan.repeated_frames=on",)}
+BESIDE = {
+    "motion_fields": ("plan.repeated_frames=on",),
+    "motion_residual": ("plan.body_repair=off",),
+}
 SCENES: dict[str, tuple[SyntheticConfig, SyntheticConfig]] = {
     "motion_fields": (named_scene("still"), TURN),
+    "motion_residual": (named_scene("turn_loose"), named_scene("turn_noise6")),
     "wide_shell": (TURN, named_scene("turn_loose")),
     "fine_detail": (FAR_AWAY, TURN),
     "repeated_frames": (STUTTER, TURN),

@@ -30,8 +30,9 @@ class PlanConfig(ConfigurationPart):
     still_px: float = Field(
         0.5, ge=0, description="A body whose points move less than this, in pixels, is still."
     )
+    # Up to 8 px a residual motion gained nothing and took half of a step: benchmarks/decisions.md.
     consistent_px: float = Field(
-        1.5, ge=0, description="Outlines nearer than this, in pixels, leave nothing to correct."
+        10.0, ge=0, description="Outlines nearer than this, in pixels, leave nothing to correct."
     )
     constant_brightness: float = Field(
         0.02, ge=0, description="Brightness of the person that changes less than this is constant."
@@ -45,6 +46,9 @@ class PlanConfig(ConfigurationPart):
     )
     fine_m: float = Field(
         0.01, gt=0, description="Cells and steps are so fine where pixels can show it, metres."
+    )
+    shell_margin_m: float = Field(
+        0.02, ge=0, description="Room around what the masks show, for the edge of the density."
     )
     narrowest_shell_m: float = Field(0.03, gt=0, description="Least shell around the body, metres.")
     widest_shell_m: float = Field(0.15, gt=0, description="Largest shell around the body, metres.")

@@ -109,7 +109,7 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
     # An unknown agreement (no mask shows the person) is no evidence of a good one.
     wrong = not off_px <= configuration.consistent_px
     if not wrong:
-        reason = "the body's outline agrees with the masks to a pixel"
+        reason = "the body's outline is near enough to the masks'"
     else:
         reason = "the body's outline is off the masks"
     return Decision(
@@ -172,9 +172,9 @@ def _light(light: NDArray[np.float64], configuration: PlanConfig) -> Decision:
 
 
 def _shell(agreement: MaskAgreement, configuration: PlanConfig) -> Decision:
-    narrow_m = configuration.narrowest_shell_m
+    room_m = configuration.narrowest_shell_m - configuration.shell_margin_m
     # An unknown agreement (no mask shows the person) is no evidence of a good one.
-    wide = not agreement.outside_m <= narrow_m
+    wide = not agreement.outside_m <= room_m
     return Decision(
         name="wide_shell",
         part="optimisation",
@@ -183,8 +183,8 @@ def _shell(agreement: MaskAgreement, configuration: PlanConfig) -> Decision:
         if wide
         else "the person stays close to the body",
         evidence={"outside_m": agreement.outside_m},
-        threshold=narrow_m,
-        saves="samples where no density can be: three quarters of them, half of a step",
+        threshold=room_m,
+        saves="samples where no density can be: up to three quarters of them, half of a step",
     ).forced(configuration.wide_shell)
 
 
@@ -193,8 +193,8 @@ def _shell_width(agreement: MaskAgreement, shell: Decision, configuration: PlanC
     narrow_m, wide_m = configuration.narrowest_shell_m, configuration.widest_shell_m
     if not shell.needed:
         return narrow_m
-    measured = agreement.outside_m if agreement.outside_m > narrow_m else wide_m
-    return min(measured, wide_m)
+    measured = agreement.outside_m + configuration.shell_margin_m
+    return min(measured if measured > narrow_m else wide_m, wide_m)
 
 
 def _visible_detail_m(agreement: MaskAgreement, configuration: PlanConfig) -> float:

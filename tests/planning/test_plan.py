@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -88,7 +89,7 @@ def test_every_decision_says_why_and_what_it_saves(folder):
 
 
 def test_meshes_off_the_masks_need_a_residual_and_its_consensus(folder):
-    plan = planned(folder, bent)
+    plan = planned(folder, bent, consistent_px=1.5)
     assert plan.needs("motion_residual")
     assert plan.needs("motion_consensus")
     evidence = plan.decision("motion_residual").evidence
@@ -135,7 +136,7 @@ def test_a_person_as_bright_from_every_side_gets_no_light(folder):
 
 
 def test_forcing_the_residual_off_leaves_nothing_to_regularise(folder):
-    plan = planned(folder, bent, motion_residual="off")
+    plan = planned(folder, bent, consistent_px=1.5, motion_residual="off")
     assert not plan.needs("motion_consensus")
 
 
@@ -215,6 +216,18 @@ def test_the_shell_is_the_narrowest_where_a_wide_one_is_not_needed(folder, force
     config = PlanConfig()
     width = planned(folder, wide_shell=force).shell_width_m
     assert width == (config.widest_shell_m if force == "on" else config.narrowest_shell_m)
+
+
+def test_the_shell_has_room_for_an_edge_around_what_the_masks_show(folder):
+    def dressed(clip):
+        kernel = np.ones((5, 5), np.uint8)
+        wider = [cv2.dilate(mask.astype(np.uint8), kernel) > 0 for mask in clip.masks]
+        return replace(clip, masks=np.stack(wider))
+
+    plan = planned(folder, change_clip=dressed)
+    outside_m = plan.decision("wide_shell").evidence["outside_m"]
+    assert plan.needs("wide_shell")
+    assert plan.shell_width_m == pytest.approx(outside_m + PlanConfig().shell_margin_m)
 
 
 def test_cells_and_steps_are_as_coarse_as_pixels_where_these_show_no_more(folder):
