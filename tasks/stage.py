@@ -13,8 +13,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
-from prefect import Task
+from prefect import Task, get_run_logger
 from prefect.cache_policies import CachePolicy
+from prefect.context import TaskRunContext
 from pydantic import JsonValue
 
 from mocoflow_core.artifacts import Artifact
@@ -100,10 +101,21 @@ class CachedStage(Generic[Inputs, Kind]):
             with torch_threads(1), showing_progress(self.kind.stage, work.note_time) as progress:
                 stage = Stage(work.path, progress, store, work.leave_out)
                 summary = self.body(stage, **arguments)  # type: ignore
-            return work.commit(self.version, *_by_content(arguments), summary)
+            made = work.commit(self.version, *_by_content(arguments), summary)
+        _log(made)
+        return made
 
     def _key(self, arguments: Mapping[str, Any]) -> str:
         return key_of(self.kind.stage, self.version, *_by_content(arguments))
+
+
+def _log(made: Artifact) -> None:
+    """What a stage has cost and where it lies, on the run's page."""
+    if TaskRunContext.get():
+        took = f"{made.wall_s:.1f} s, {made.cpu_s:.1f} CPU s"
+        get_run_logger().info(f"{made.stage} took {took}: {made.stage}/{made.key}")
+        for warning in made.warnings:
+            get_run_logger().warning(warning)
 
 
 def stage(

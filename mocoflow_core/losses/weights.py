@@ -15,7 +15,6 @@ class LossConfig(ConfigurationPart):
     local_share: float = Field(1.0, ge=0, description="of the local term; 0: without local")
     density_threshold: float = Field(0.01, ge=0, description="consensus above it, 1/m (paper)")
     consensus_points: int = Field(512, ge=1, description="samples that the consensus looks at")
-    fit_weight: float = Field(10.0, ge=0, description="L_fit in fit_motion (paper: 10)")
     silhouette_weight: float = Field(0.1, ge=0, description="opacity against the mask")
     offset_weight: float = Field(1.0, ge=0, description="squared offset from the mesh's surface")
     residual_weight: float = Field(1.0, ge=0, description="squared correction of the body's motion")

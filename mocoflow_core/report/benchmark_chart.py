@@ -55,6 +55,8 @@ def write_benchmark_chart(runs: Runs[CurveRow], path: Path) -> None:
     """Write the chart as a PNG; nothing where there is nothing to draw."""
     figure = plot_benchmark(runs)
     if figure is not None:
+        # On a page of its own the chart is transparent; a picture may be shown on black.
+        figure.patch.set_alpha(1.0)
         figure.savefig(path, dpi=110, facecolor="white")
 
 

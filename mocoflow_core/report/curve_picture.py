@@ -20,4 +20,6 @@ def write_curve_picture(
         [row for row in rows if row.method == method], training_spans(stages), level
     )
     if figure is not None:
+        # On a page of its own the plot is transparent; a picture may be shown on black.
+        figure.patch.set_alpha(1.0)
         figure.savefig(path, dpi=80, facecolor="white")
