@@ -109,7 +109,7 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
     # An unknown agreement (no mask shows the person) is no evidence of a good one.
     wrong = not off_px <= configuration.consistent_px
     if not wrong:
-        reason = "the body's outline is near enough to the masks'"
+        reason = "a residual motion was never seen to gain anything where outlines are so near"
     else:
         reason = "the body's outline is off the masks"
     return Decision(
