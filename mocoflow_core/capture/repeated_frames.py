@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 # The person's pixels may change by so much more than the background's, and still be still:
 # what changes there is the camera's noise.
-NOISE_RATIO = 1.2
+NOISE_RATIO = 1.3
 # And by this in any case, of 255: rounding, where there is no noise at all.
 ROUNDING = 0.25
 # A background that changes by more than noise does, of 255, is another picture: nothing repeats.
-LARGEST_NOISE = 8.0
+LARGEST_NOISE = 4.0
 
 
 def repeated_frames(
@@ -43,6 +43,7 @@ def _shows_the_same(
     changes = np.abs(first.astype(np.int16) - second).mean(axis=-1)
     if not person.any():
         return bool(changes.mean() <= ROUNDING)
-    noise = float(changes[~person].mean()) if not person.all() else 0.0
+    # The median: a screen or a passer-by that fills less than half of the background is no noise.
+    noise = float(np.median(changes[~person])) if not person.all() else 0.0
     still = noise <= LARGEST_NOISE
     return bool(still and changes[person].mean() <= NOISE_RATIO * noise + ROUNDING)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import torch
 from safetensors import safe_open
@@ -32,6 +35,9 @@ class Progress:
     snapshot_s: float = 0.0  # wall seconds of ``elapsed`` at the last snapshot
     reached: bool = False  # the score at which the run may stop
     events: list[GuardEvent] = field(default_factory=list)
+    best: float = math.inf  # the guard's: what the losses sum to where they are best
+    recent: list[float] = field(default_factory=list)  # the guard's: sums of the last losses
+    losses: list[dict[str, float]] = field(default_factory=list)  # of the last steps
     tries: int = 1
 
     def to_json(self) -> str:
@@ -45,17 +51,31 @@ class Progress:
         return cls(**values)
 
 
+class Restored(NamedTuple):
+    """What a checkpoint holds besides the objects that it was loaded into."""
+
+    progress: Progress
+    good: dict[str, Tensor]  # the guard's last good state
+
+
 def save_checkpoint(
     folder: Path,
     progress: Progress,
     model: nn.Module,
     optimiser: torch.optim.Optimizer,
     generator: torch.Generator,
+    good: Mapping[str, Tensor],
 ) -> None:
-    """Write beside, flush, rename: a kill at any moment leaves the old or the new checkpoint."""
+    """Write beside, flush, rename: a kill at any moment leaves the old or the new checkpoint.
+
+    Args:
+        good: the guard's last good state, to which a resumed run may have to go back.
+    """
     tensors = {f"model.{name}": value for name, value in model.state_dict().items()}
     for index, state in optimiser.state_dict()["state"].items():
         tensors |= {f"optimiser.{index}.{name}": value for name, value in state.items()}
+    # Cloned: safetensors refuses tensors that share memory.
+    tensors |= {f"good.{name}": value.clone() for name, value in good.items()}
     tensors["generator"] = generator.get_state()
     beside = folder / (_FILE + ".tmp")
     save_file(tensors, beside, metadata={"progress": progress.to_json()})
@@ -66,7 +86,7 @@ def save_checkpoint(
 
 def load_checkpoint(
     folder: Path, model: nn.Module, optimiser: torch.optim.Optimizer, generator: torch.Generator
-) -> Progress | None:
+) -> Restored | None:
     """Restore a checkpoint into the given objects; None where there is none."""
     path = folder / _FILE
     if not path.is_file():
@@ -79,7 +99,8 @@ def load_checkpoint(
         state.setdefault(int(index), {})[part] = value
     optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
     generator.set_state(tensors["generator"])
-    return Progress.from_json(read_metadata(path)["progress"])
+    progress = Progress.from_json(read_metadata(path)["progress"])
+    return Restored(progress, _under("good.", tensors))
 
 
 def remove_checkpoint(folder: Path) -> None:

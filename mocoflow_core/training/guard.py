@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from statistics import median
 
@@ -54,8 +55,8 @@ class Guard:
         self.allowed = allowed
         self.events: list[GuardEvent] = []
         self.rate_scale = 1.0
-        self._recent: deque[float] = deque(maxlen=max(_RECENT_STEPS, -(-_RECENT_RAYS // rays)))
-        self._best = math.inf
+        self.recent: deque[float] = deque(maxlen=max(_RECENT_STEPS, -(-_RECENT_RAYS // rays)))
+        self.best = math.inf
         bad = self._not_finite() or self._moment_not_finite()
         if bad is not None:
             raise TrainingDiverged(
@@ -65,7 +66,29 @@ class Guard:
 
     def expect(self, loss: float) -> None:
         """What the losses sum to at the start, over many rays."""
-        self._best = loss if math.isfinite(loss) else math.inf
+        self.best = loss if math.isfinite(loss) else math.inf
+
+    def good_state(self) -> dict[str, Tensor]:
+        """The last good weights and moments by name, for a checkpoint."""
+        named = list(self.model.named_parameters())
+        state = {f"weight/{n}": good for (n, _), good in zip(named, self._weights, strict=True)}
+        for name, parameter in named:
+            for part, value in self._moments.get(parameter, {}).items():
+                if isinstance(value, Tensor):
+                    state[f"moment/{name}/{part}"] = value
+        return state
+
+    def restore(self, good: Mapping[str, Tensor], best: float, recent: Iterable[float]) -> None:
+        """Go on as the guard whose ``good_state``, ``best`` and ``recent`` these are."""
+        self.best = best
+        self.recent.extend(recent)
+        named = dict(self.model.named_parameters())
+        self._weights = [good[f"weight/{name}"] for name in named]
+        self._moments: dict[Tensor, dict[str, object]] = {}
+        for key, value in good.items():
+            kind, name, *part = key.split("/")
+            if kind == "moment":
+                self._moments.setdefault(named[name], {})[part[0]] = value
 
     def remember(self) -> None:
         """Take the present state as good, unless it is not finite."""
@@ -78,19 +101,19 @@ class Guard:
 
     def settle(self) -> str | None:
         """Remember the present state if the last steps prove it good; else their decline."""
-        enough = len(self._recent) == self._recent.maxlen
+        enough = len(self.recent) == self.recent.maxlen
         decline = self.decline() if enough else None
         if enough and decline is None:
-            self._best = min(self._best, median(self._recent))
+            self.best = min(self.best, median(self.recent))
             self.remember()
         return decline
 
     def decline(self) -> str | None:
         """Whether the last steps are worse than the best ones, or too few since a refusal."""
-        if len(self._recent) >= _FEWEST_STEPS:
+        if len(self.recent) >= _FEWEST_STEPS:
             return self._risen(_WORSE)
-        if self.events and self._recent:
-            return f"only {len(self._recent)} steps since the last refusal: too few to trust"
+        if self.events and self.recent:
+            return f"only {len(self.recent)} steps since the last refusal: too few to trust"
         return None
 
     def problem(self, terms: dict[str, Tensor]) -> str | None:
@@ -106,14 +129,14 @@ class Guard:
         if bad is not None:
             return f"{bad} is not finite"
         if terms:
-            self._recent.append(sum(float(value.detach()) for value in terms.values()))
-        return self._risen(_ASTRAY) if len(self._recent) == self._recent.maxlen else None
+            self.recent.append(sum(float(value.detach()) for value in terms.values()))
+        return self._risen(_ASTRAY) if len(self.recent) == self.recent.maxlen else None
 
     def _risen(self, factor: float) -> str | None:
-        usual = median(self._recent) if self._recent else 0.0
-        if usual <= factor * max(self._best, _SMALL_LOSS):
+        usual = median(self.recent) if self.recent else 0.0
+        if usual <= factor * max(self.best, _SMALL_LOSS):
             return None
-        return f"the losses have risen from {self._best:.3g} to {usual:.3g}: rates too high?"
+        return f"the losses have risen from {self.best:.3g} to {usual:.3g}: rates too high?"
 
     def _moment_not_finite(self) -> str | None:
         """The first moment of the optimiser that is not finite."""
@@ -157,7 +180,7 @@ class Guard:
             for owner, moments in self._moments.items():
                 self.optimiser.state[owner] = {n: _copied(v) for n, v in moments.items()}
         self.rate_scale *= 0.5
-        self._recent.clear()
+        self.recent.clear()
 
 
 def _copied(value: object) -> object:

@@ -14,6 +14,7 @@ from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.checkpoint import (
     Progress,
+    Restored,
     load_checkpoint,
     remove_checkpoint,
     save_checkpoint,
@@ -23,7 +24,7 @@ from mocoflow_core.training.guard import Guard
 from mocoflow_core.training.objective import Objective
 from mocoflow_core.training.pace import plan_pace, plan_rays
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
-from mocoflow_core.training.snapshots import Snapshot, keep_snapshot
+from mocoflow_core.training.snapshots import Snapshot, forget_snapshots, keep_snapshot
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
@@ -70,17 +71,25 @@ class TrainingRun:
         self._base_rates = [group["lr"] for group in self.optimiser.param_groups]
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
-        self.progress = restored or self._first_start()
-        if restored is not None:
-            restored.tries += 1
-            clock.go_on_from(restored.elapsed)
-            restored.elapsed = clock.read()
-        pace = plan_pace(schedule, before.wall, self.progress.started_s)
-        self.pace = replace(pace, steps=self.progress.steps)
+        self.progress = restored.progress if restored else self._first_start()
         self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, self.progress.rays)
-        self.guard.expect(self._start_loss())
+        self.guard.expect(self.progress.best)
         self.guard.events = self.progress.events
         self.guard.rate_scale = self.progress.rate_scale
+        if restored:
+            self._resume(restored)
+        forget_snapshots(workspace, self.progress.step)
+        pace = plan_pace(schedule, before.wall, self.progress.started_s)
+        self.pace = replace(pace, steps=self.progress.steps)
+
+    def _resume(self, restored: Restored) -> None:
+        """Go on as if there had been no kill, but for the clock, which counts both tries."""
+        progress = restored.progress
+        progress.tries += 1
+        self.clock.go_on_from(progress.elapsed)
+        progress.elapsed = self.clock.read()
+        self._losses.extend(progress.losses)
+        self.guard.restore(restored.good, progress.best, progress.recent)
 
     def run(self) -> None:
         """All remaining steps."""
@@ -106,9 +115,10 @@ class TrainingRun:
         if left_s is not None and left_s > 0:
             with torch_threads(threads):
                 rays = plan_rays(schedule, left_s, seconds_of(self._try_out))
+        best = self._start_loss()
         now = self.clock.read()
         steps = plan_pace(schedule, self.before.wall, now.wall).steps
-        return Progress(threads, steps, rays, started_s=now.wall, elapsed=now)
+        return Progress(threads, steps, rays, started_s=now.wall, elapsed=now, best=best)
 
     def _left_s(self) -> float | None:
         """What remains of a budget."""
@@ -215,7 +225,11 @@ class TrainingRun:
     def _save(self) -> None:
         if self.guard.problem({}) is not None:
             return  # the next step refuses it
-        save_checkpoint(self.workspace, self.progress, self.field, self.optimiser, self.generator)
+        progress, guard = self.progress, self.guard
+        progress.best, progress.recent = guard.best, list(guard.recent)
+        progress.losses = list(self._losses)
+        parts = (self.field, self.optimiser, self.generator)
+        save_checkpoint(self.workspace, progress, *parts, guard.good_state())
 
 
 def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:

@@ -35,22 +35,29 @@ def snapshot_weights(scene: Path, snapshot: Snapshot) -> Path:
     return scene / _FOLDER / f"{snapshot.step:06d}.safetensors"
 
 
+def forget_snapshots(scene: Path, after: int) -> None:
+    """Drop those later than a step: a try that was killed took them, and its clock is lost."""
+    known = read_snapshots(scene)
+    lost = [snapshot for snapshot in known if snapshot.step > after]
+    if lost:
+        _write_index(scene, [snapshot for snapshot in known if snapshot.step <= after])
+        for snapshot in lost:
+            snapshot_weights(scene, snapshot).unlink(missing_ok=True)
+
+
 def keep_snapshot(
     scene: Path, field: SceneField, step: int, elapsed: Seconds, train_psnr: float | None
 ) -> list[Snapshot]:
-    """Save the present state and give all snapshots up to it.
-
-    Later ones, of a try that was killed after its last checkpoint, are forgotten.
-    """
+    """Save the present state and give all snapshots up to it; one of the same step is replaced."""
     (scene / _FOLDER).mkdir(exist_ok=True)
     taken = Snapshot(step, elapsed.wall, elapsed.cpu, train_psnr)
-    known = read_snapshots(scene)
-    for forgotten in known:
-        if forgotten.step >= step:
-            snapshot_weights(scene, forgotten).unlink(missing_ok=True)
-    kept = [earlier for earlier in known if earlier.step < step] + [taken]
+    kept = [earlier for earlier in read_snapshots(scene) if earlier.step < step] + [taken]
     save_file(field.state_dict(), snapshot_weights(scene, taken))
-    beside = scene / _FOLDER / f"{_INDEX}.new"
-    beside.write_text(json.dumps([asdict(snapshot) for snapshot in kept]))
-    beside.replace(scene / _FOLDER / _INDEX)
+    _write_index(scene, kept)
     return kept
+
+
+def _write_index(scene: Path, snapshots: list[Snapshot]) -> None:
+    beside = scene / _FOLDER / f"{_INDEX}.new"
+    beside.write_text(json.dumps([asdict(snapshot) for snapshot in snapshots]))
+    beside.replace(scene / _FOLDER / _INDEX)

@@ -79,3 +79,12 @@ def test_a_black_frame_repeats_nothing():
     frames, masks = filmed([2] * 4)
     frames[2] = 0
     assert not repeated_frames(frames, masks, np.ones(4, bool))[2:].any()
+
+
+def test_a_screen_that_flickers_behind_the_person_hides_no_movement():
+    frames, masks = filmed([4] * 8)
+    frames = np.minimum(frames, 200)
+    for row in range(8):
+        frames[row][masks[row]] += np.uint8(5 * row)
+        frames[row, :, 30:] = 140 if row % 2 else 117
+    assert not repeated_frames(frames, masks, ALL).any()

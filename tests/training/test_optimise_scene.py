@@ -30,7 +30,7 @@ class Killed(Exception):
     """What ends a run from outside."""
 
 
-def killed_at(step: int, seen=lambda: None):
+def killed_at(step: float, seen=lambda: None):
     def progress(fraction: float, what: str) -> None:
         seen()
         if round(fraction * SCHEDULE.joint_steps) >= step:
@@ -80,6 +80,34 @@ def test_a_killed_run_ends_in_the_parameters_of_an_undisturbed_one(
     assert result.tries == 2
     assert result.steps == SCHEDULE.joint_steps
     assert_same(trained, tmp_path)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_a_run_that_went_back_ends_the_same_when_killed_before_or_after(prepared, tmp_path, share):
+    # So high a rate leaves every minimum: the guard goes back at step 50.
+    wild = CAREFUL.model_copy(
+        update={
+            "checkpoint_every_s": 0.1,
+            "coarse_steps": 60,
+            "fine_steps": 40,
+            "rate_features": 0.5,
+            "rate_networks": 0.5,
+            "rate_motion": 0.5,
+        }
+    )
+    undisturbed = train(prepared, tmp_path / "undisturbed", schedule=wild)
+    assert any(event["step"] == 50 for event in undisturbed.events)
+    with pytest.raises(Killed):
+        train(
+            prepared,
+            tmp_path / "killed",
+            schedule=wild,
+            progress=killed_at(share * SCHEDULE.joint_steps),
+        )
+    resumed = train(prepared, tmp_path / "killed", schedule=wild)
+    assert resumed.events == undisturbed.events
+    assert resumed.losses == pytest.approx(undisturbed.losses)
+    assert_same(tmp_path / "undisturbed", tmp_path / "killed")
 
 
 def test_work_after_the_last_checkpoint_is_done_again_to_the_same_end(prepared, trained, tmp_path):
