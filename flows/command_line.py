@@ -101,8 +101,10 @@ def plan(
     from flows.request import Request
 
     # Bad settings are refused before anything heavy is loaded.
-    request = Request(scene_path=scene, preset=preset, settings=tuple(settings or ()))
-    _ = request.configuration, request.scene
+    request = Request(
+        scene_path=scene, preset=preset, meshes=meshes, settings=tuple(settings or ())
+    )
+    request.check()
     set_environment()
     from rich.console import Console
 

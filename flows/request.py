@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from flows.stopping import read_target
 from flows.user_folders import cache_folder
+from mocoflow_core.capture.extract import select_training_frames
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.content_key import key_of
@@ -78,8 +79,14 @@ class Request(BaseModel):
         """The evaluation cameras' files and the truth."""
         return evaluation_source(self.scene)
 
+    def check(self) -> None:
+        """Raise InputError for what settings and file names show to be wrong, before any work."""
+        select_training_frames(self.scene, self.configuration.capture)
+        _ = self.bodies
+
     def claim(self, out: Path) -> RunFolder:
         """Take a folder for the results. Raises InputError when it holds anything else."""
+        self.check()
         begun = RunRecord(
             request=self._key(),
             scene=self.scene.description.name,

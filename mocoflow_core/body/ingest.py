@@ -21,6 +21,7 @@ from mocoflow_core.body.mesh_checks import (
 )
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.motion_checks import check_frozen, check_turns
+from mocoflow_core.capture.frame_selection import require_contiguous
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
@@ -80,6 +81,7 @@ def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> Ingested
     require_finite(raw)
     require_metres(raw)
     expected = scene.frames(scene.train_camera).indices
+    require_contiguous(expected, f"frames of {scene.train_camera}")
     require_frames(raw, expected, scene.description.fps)
     faces, face_warnings = _proper_faces(raw)
     joined, gap_warnings = _joined(replace(raw, faces=faces), expected)

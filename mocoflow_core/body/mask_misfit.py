@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 from torch import Tensor
 
 from mocoflow_core.body.joint_correction import JointCorrection, blend
@@ -41,6 +42,12 @@ class MaskMisfitConfig(ConfigurationPart):
     outline_points: int = Field(240, ge=8, description="Points taken on each mask's outline.")
     turn_m: float = Field(0.05, gt=0, description="Distance that a turn of 60 degrees is worth.")
     least_agreement: float = Field(0.3, ge=-1, le=1, description="Cosine of matching outlines.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.agreeing_px >= self.apart_px:
+            raise ValueError("agreeing_px must be below apart_px")
+        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +148,7 @@ def expected_share(apart_px: float, configuration: MaskMisfitConfig) -> float:
     """How large errors are to be expected, in usual ones: 0 where the estimate fits already."""
     if np.isnan(apart_px):
         return 0.0
-    # Where both thresholds are the same, or crossed, the ramp is a step.
-    ramp = max(configuration.apart_px - configuration.agreeing_px, 1e-9)
+    ramp = configuration.apart_px - configuration.agreeing_px
     return float(np.clip((apart_px - configuration.agreeing_px) / ramp, 0.0, 1.0))
 
 

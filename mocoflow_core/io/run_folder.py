@@ -83,16 +83,20 @@ class RunFolder:
 
     @classmethod
     def claim(cls, path: Path, begun: RunRecord) -> RunFolder:
-        """Take a new or empty folder, or one of the same request; refuse anything else."""
+        """Take a new or empty folder, or one of the same request; refuse anything else.
+
+        A run that left nothing but its record, because its input was bad, gives its folder up.
+        """
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
             held = _record(path)
-            if held is None or held.request != begun.request:
+            if held is not None and held.request == begun.request:
+                return cls(path, begun)
+            if held is None or held.finished or not _holds_nothing_else(path):
                 raise InputError(
                     "--out must be new, empty, or of the same scene and settings",
                     f"{path} with {'another run' if held else 'something else in it'}",
                     "Choose another folder.",
                 )
-            return cls(path, begun)
         with full_disk_is_bad_input(f"The folder {path}"):
             path.mkdir(parents=True, exist_ok=True)
             _write(path, begun)
@@ -130,6 +134,10 @@ def _record(folder: Path) -> RunRecord | None:
         return RunRecord.model_validate_json((folder / RUN).read_bytes())
     except (OSError, ValidationError):
         return None
+
+
+def _holds_nothing_else(folder: Path) -> bool:
+    return {file.name for file in folder.iterdir()} <= {RUN, f".{RUN}.new"}
 
 
 def _write(folder: Path, record: RunRecord) -> None:

@@ -31,9 +31,7 @@ ABLATIONS: dict[str, Ablation] = {
     "without_smoothness": Ablation(
         "losses.smoothness_weight", 0.0, "the smoothness of that correction in time"
     ),
-    "without_repair": Ablation(
-        "repair.masks.agreeing_px", 1e6, "bending the given mesh before training"
-    ),
+    "without_repair": Ablation("plan.body_repair", "off", "bending the given mesh before training"),
     "without_colours": Ablation(
         "repair.colours.independent_points", 0, "the colours of the skin in that bending"
     ),

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from mocoflow_core.body.light import measure_light
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.errors import InputError
 from mocoflow_core.planning.brightness import brightness_shifts
 from mocoflow_core.planning.canonical_frame import closeness
 from mocoflow_core.planning.configuration import PlanConfig
@@ -71,7 +72,7 @@ def plan_scene(
         *preparation,
         moves,
         residual,
-        _consensus(residual).forced(configuration.motion_consensus),
+        _consensus(residual, configuration),
         _appearance(clip, posed, configuration),
         lit,
         shell,
@@ -123,7 +124,13 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
     ).forced(configuration.motion_residual)
 
 
-def _consensus(residual: Decision) -> Decision:
+def _consensus(residual: Decision, configuration: PlanConfig) -> Decision:
+    if configuration.motion_consensus == "on" and not residual.needed:
+        raise InputError(
+            "plan.motion_residual must be on where plan.motion_consensus is on",
+            f"a residual left out: {residual.reason}",
+            "Set both on, or leave both on auto.",
+        )
     return Decision(
         name="motion_consensus",
         part="optimisation",
@@ -134,7 +141,7 @@ def _consensus(residual: Decision) -> Decision:
         evidence=residual.evidence,
         threshold=residual.threshold,
         saves="the chains through the motion of two frames, about half of a step",
-    )
+    ).forced(configuration.motion_consensus)
 
 
 def _appearance(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> Decision:

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from mocoflow_core.body.mask_misfit import expected_share
+from mocoflow_core.body.mask_misfit import MaskMisfitConfig, expected_share
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
 from mocoflow_core.body.repair import RepairConfig, RoundsConfig, outlines_apart, repair_body
@@ -167,14 +167,18 @@ def test_masks_away_from_the_body_give_finite_meshes(
     assert np.isfinite(fitted(replace(clip, masks=elsewhere), bent)).all()
 
 
-def test_an_estimate_that_counts_as_agreeing_is_left_as_it_came(
+def test_where_no_error_is_expected_the_estimate_is_left_as_it_came(
     truth: MeshSequence, bent: MeshSequence
 ) -> None:
-    masks = CONFIGURATION.masks.model_copy(update={"agreeing_px": 1e6})
     apart_px = outlines_apart(filmed(truth), bent, CONFIGURATION)
-    assert apart_px > CONFIGURATION.masks.agreeing_px
-    assert expected_share(apart_px, masks) == 0
+    assert expected_share(apart_px, CONFIGURATION.masks) > 0
+    assert expected_share(CONFIGURATION.masks.agreeing_px, CONFIGURATION.masks) == 0
     assert repair_body(filmed(truth), bent, 0.0, CONFIGURATION, silent) is bent
+
+
+def test_thresholds_out_of_order_are_refused() -> None:
+    with pytest.raises(ValueError, match="below apart_px"):
+        MaskMisfitConfig(agreeing_px=2.0, apart_px=1.5)
 
 
 def test_colours_find_the_twist_that_outlines_do_not_show(

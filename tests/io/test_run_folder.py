@@ -71,3 +71,16 @@ def test_what_is_taken_twice_is_replaced_whole(tmp_path):
         (views / f"{number}.png").touch()
         folder.take(views, "views")
     assert [path.name for path in (tmp_path / "run" / "views").iterdir()] == ["1.png"]
+
+
+def test_a_run_that_left_nothing_but_its_record_gives_its_folder_up(tmp_path):
+    RunFolder.claim(tmp_path / "run", begun())
+    RunFolder.claim(tmp_path / "run", begun("mended"))
+    assert RunFolder.claim(tmp_path / "run", begun("mended")).begun.request == "mended"
+
+
+def test_an_unfinished_run_with_results_keeps_its_folder(tmp_path):
+    (tmp_path / "report.html").write_text("page")
+    RunFolder.claim(tmp_path / "run", begun()).take(tmp_path / "report.html", "report.html")
+    with pytest.raises(InputError, match="another run"):
+        RunFolder.claim(tmp_path / "run", begun("b"))
