@@ -30,9 +30,9 @@ class PlanConfig(ConfigurationPart):
     still_px: float = Field(
         0.5, ge=0, description="A body whose points move less than this, in pixels, is still."
     )
-    # Up to 8 px a residual motion gained nothing and took half of a step: benchmarks/decisions.md.
-    consistent_px: float = Field(
-        10.0, ge=0, description="Outlines nearer than this, in pixels, leave nothing to correct."
+    # Up to there a residual motion gained nothing and took half of a step: benchmarks/decisions.md.
+    consistent_m: float = Field(
+        0.09, ge=0, description="Outlines nearer than this, in metres, leave nothing to correct."
     )
     constant_brightness: float = Field(
         0.02, ge=0, description="Brightness of the person that changes less than this is constant."

@@ -106,9 +106,9 @@ def _moves(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> Decis
 
 
 def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) -> Decision:
-    off_px = agreement.outline_px
+    off_m = agreement.outline_px * agreement.pixel_m
     # An unknown agreement (no mask shows the person) is no evidence of a good one.
-    wrong = not off_px <= configuration.consistent_px
+    wrong = not off_m <= configuration.consistent_m
     if not wrong:
         reason = "a residual motion was never seen to gain anything where outlines are so near"
     else:
@@ -118,8 +118,8 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
         part="optimisation",
         needed=wrong and moves,
         reason=reason if moves else "the body stands still",
-        evidence={"outline_px": off_px, "overlap": agreement.overlap},
-        threshold=configuration.consistent_px,
+        evidence={"outline_m": off_m, "overlap": agreement.overlap},
+        threshold=configuration.consistent_m,
         saves="the residual motion network: the body's own motion carries every point",
     ).forced(configuration.motion_residual)
 

@@ -89,11 +89,11 @@ def test_every_decision_says_why_and_what_it_saves(folder):
 
 
 def test_meshes_off_the_masks_need_a_residual_and_its_consensus(folder):
-    plan = planned(folder, bent, consistent_px=1.5)
+    plan = planned(folder, bent, consistent_m=0.01)
     assert plan.needs("motion_residual")
     assert plan.needs("motion_consensus")
     evidence = plan.decision("motion_residual").evidence
-    assert evidence["outline_px"] > plan.decision("motion_residual").threshold
+    assert evidence["outline_m"] > plan.decision("motion_residual").threshold
 
 
 def test_a_body_that_stands_still_needs_no_motion(tmp_path):
@@ -136,7 +136,7 @@ def test_a_person_as_bright_from_every_side_gets_no_light(folder):
 
 
 def test_forcing_the_residual_off_leaves_nothing_to_regularise(folder):
-    plan = planned(folder, bent, consistent_px=1.5, motion_residual="off")
+    plan = planned(folder, bent, consistent_m=0.01, motion_residual="off")
     assert not plan.needs("motion_consensus")
 
 
