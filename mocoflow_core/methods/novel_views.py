@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.orbit import moved_around
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.io.video import write_video
@@ -54,13 +55,14 @@ def render_novel_views(
     """Write a video, one PNG, or a folder of ``%06d.png``; give the number of pictures.
 
     Frames are named by their source number, other times by their position. Raises InputError for
-    an unknown camera, a time outside the clip, or a background that is neither colour nor picture.
+    an unknown camera, a time outside the clip, a background that is neither colour nor picture, and
+    a full disk.
     """
     scene = TrainedScene.open(trained)
     shots = _shots(run, scene, request)
     background = _background(request.background, shots[0].camera)
     # More than one thread only where the optimisation has measured that it pays.
-    with torch_threads(1):
+    with torch_threads(1), full_disk_is_bad_input(str(out)):
         pictures = _pictures(scene, shots, background, progress)
         _write(pictures, len(shots), out, request.fps or _clip(run)["fps"])
     return len(shots)

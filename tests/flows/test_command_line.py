@@ -282,6 +282,14 @@ def test_a_view_that_cannot_be_is_refused(refuse, first_run, tmp_path, option, v
     refuse("render", out, option, value, "--out", tmp_path / "views", because=because)
 
 
+@pytest.mark.parametrize("name", ["views.mp4", "view.png"])
+def test_a_full_disk_leaves_no_half_of_a_view(refuse, first_run, tmp_path, name):
+    out, _ = first_run
+    (tmp_path / f".new.{name}").symlink_to("/dev/full")
+    refuse("render", out, "--frames", "3", "--out", tmp_path / name, because="full disk")
+    assert not list(tmp_path.iterdir())
+
+
 def test_rendering_a_folder_without_a_run_is_refused(refuse, tmp_path):
     refuse("render", tmp_path, "--out", tmp_path / "views", because="run.json")
 
