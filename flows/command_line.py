@@ -252,12 +252,12 @@ def synth(
     typer.echo(f"Scene: {out}")
 
 
-@app.command()
+@app.command(cls=ListOptions)
 def stability(
     out: Annotated[Path, typer.Option(help="New folder for table, plots and page.")],
     areas: Annotated[
         list[str] | None,
-        typer.Option("--area", metavar="NAME", help="Only this area; may be repeated."),
+        typer.Option("--area", metavar="NAME...", help="Only these areas."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Leave out what trains scenes.")] = False,
 ) -> None:

@@ -106,6 +106,12 @@ def test_what_a_full_disk_broke_off_is_done_again_in_the_same_folder(
     assert mocoflow(*command) == 0
 
 
+def test_several_areas_follow_one_option(mocoflow, tmp_path):
+    assert mocoflow("--area", AREA, "encoding", "--quick", "--out", tmp_path / "out") == 0
+    rows = read_table(tmp_path / "out" / "stability.parquet")
+    assert {row.area for row in rows} == {AREA, "encoding"}
+
+
 def test_a_folder_that_holds_something_else_is_refused(run, tmp_path):
     (tmp_path / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="something else"):
