@@ -39,6 +39,9 @@ CLOCKED_STAGES = (
     "optimise_scene",
 )
 
+# What is measured along the curve; distances to the truth are taken at the end alone.
+CURVE_METRICS = ("psnr_union", "psnr", "psnr_image", "ssim", "mask_iou", "train_psnr")
+
 # Errors that are 1 - score; the others are errors already, or PSNR.
 SIMILARITIES = ("ssim", "mask_iou", "plausibility", "oks")
 
