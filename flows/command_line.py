@@ -193,7 +193,11 @@ def render(
     frames: Annotated[str, typer.Option(help="Source numbers: 0,5,10-20.")] = "",
     times: Annotated[str, typer.Option(help="Seconds from the first frame: 0.1,0.25.")] = "",
     fps: Annotated[
-        float | None, typer.Option(help="Pictures per second of the whole clip.", min=0.1)
+        float | None,
+        typer.Option(
+            help="Pictures per second of the whole clip; beside --frames or --times, of the video.",
+            min=0.1,
+        ),
     ] = None,
     background: Annotated[str, typer.Option(help="A colour or a picture.")] = "white",
     rotate: Annotated[

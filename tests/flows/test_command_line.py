@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from flows.command_line import main
+from mocoflow_core.io.video import VideoDescription, describe_video
 from tests.flows.stages import STAGES
 
 ROOT = Path(__file__).parents[2]
@@ -280,6 +281,24 @@ def test_a_rendered_frame_is_the_scored_view(first_run, tmp_path):
 def test_a_view_that_cannot_be_is_refused(refuse, first_run, tmp_path, option, value, because):
     out, _ = first_run
     refuse("render", out, option, value, "--out", tmp_path / "views", because=because)
+
+
+def test_a_choice_of_times_is_never_ignored_for_another(refuse, first_run, tmp_path):
+    out, _ = first_run
+    frames, times, fps = ("--frames", "2"), ("--times", "0.1"), ("--fps", "5")
+    views = ("--out", tmp_path / "views")
+    refuse("render", out, *frames, *times, *views, because="--frames and --times")
+    refuse("render", out, *frames, *fps, *views, because="--fps beside --frames")
+    refuse("render", out, *times, *fps, *views, because="--fps beside --times")
+    assert not list(tmp_path.iterdir())
+
+
+def test_fps_beside_frames_is_the_rate_of_the_video(first_run, tmp_path):
+    out, _ = first_run
+    video = tmp_path / "views.mp4"
+    run = mocoflow("render", out, "--frames", "2,4,5", "--fps", "5", "--out", video)
+    assert run.returncode == 0, run.stderr
+    assert describe_video(video) == VideoDescription(fps=5.0, frame_count=3)
 
 
 @pytest.mark.parametrize("name", ["views.mp4", "view.png"])
