@@ -27,8 +27,6 @@ SCHEMA = pa.schema(
 # not make the scene any better, and orchestration is reported beside it.
 CLOCKED_STAGES = (
     "extract_clip",
-    "perceive_person",
-    "fit_body",
     "ingest_meshes",
     "locate_body",
     "repair_body",
