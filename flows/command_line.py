@@ -195,7 +195,11 @@ def render(
     frames: Annotated[str, typer.Option(help="Source numbers: 0,5,10-20.")] = "",
     times: Annotated[str, typer.Option(help="Seconds from the first frame: 0.1,0.25.")] = "",
     fps: Annotated[
-        float | None, typer.Option(help="Pictures per second of the whole clip.", min=0.1)
+        float | None,
+        typer.Option(
+            help="Pictures per second of the whole clip; beside --frames or --times, of the video.",
+            min=0.1,
+        ),
     ] = None,
     background: Annotated[str, typer.Option(help="A colour or a picture.")] = "white",
     rotate: Annotated[
@@ -254,12 +258,12 @@ def synth(
     typer.echo(f"Scene: {out}")
 
 
-@app.command()
+@app.command(cls=ListOptions)
 def stability(
     out: Annotated[Path, typer.Option(help="New folder for table, plots and page.")],
     areas: Annotated[
         list[str] | None,
-        typer.Option("--area", metavar="NAME", help="Only this area; may be repeated."),
+        typer.Option("--area", metavar="NAME...", help="Only these areas."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Leave out what trains scenes.")] = False,
 ) -> None:

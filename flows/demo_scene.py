@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import rmtree
 from tempfile import mkdtemp
 
 from flows.user_folders import cache_folder
 from mocoflow_core.io.content_key import digest_document
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.synthetic.catalogue import named_scene
+from mocoflow_core.synthetic.configuration import SyntheticConfig
 from mocoflow_core.synthetic.scene_writer import write_scene
 from tasks.terminal_bar import terminal_bar
 
@@ -15,15 +18,23 @@ from tasks.terminal_bar import terminal_bar
 def demo_scene(name: str) -> Path:
     """The folder of a synthetic scene, named as in ``named_scene``.
 
-    It appears complete or not at all.
+    It appears complete or not at all. Raises InputError for an unknown name and a full disk.
     """
     configuration = named_scene(name)
     digest = digest_document(configuration.model_dump(mode="json"))
     folder = cache_folder() / "scenes" / f"{configuration.name}-{digest[:12]}"
     if not folder.is_dir():
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(mkdtemp(prefix=f"{configuration.name}-", dir=folder.parent))
+        with full_disk_is_bad_input(f"The folder {folder.parent}"):
+            _make(configuration, folder)
+    return folder
+
+
+def _make(configuration: SyntheticConfig, folder: Path) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    beside = Path(mkdtemp(prefix=f"{configuration.name}-", dir=folder.parent))
+    try:
         with terminal_bar(f"synth {configuration.name}") as progress:
             write_scene(configuration, beside, progress)
         beside.rename(folder)
-    return folder
+    finally:
+        rmtree(beside, ignore_errors=True)  # Gone already where all went well.

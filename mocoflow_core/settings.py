@@ -16,7 +16,7 @@ Configuration = TypeVar("Configuration", bound=ConfigurationPart)
 
 
 def with_settings(configuration: Configuration, settings: Sequence[str]) -> Configuration:
-    """The configuration with settings such as ``schedule.joint_steps=500`` applied.
+    """The configuration with settings such as ``schedule.fine_steps=500`` applied.
 
     Values are JSON where they can be read so, else text. Raises InputError for an unknown field,
     naming the closest one, and for a value that the field refuses.

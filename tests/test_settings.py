@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from mocoflow_core.errors import InputError
@@ -11,6 +13,11 @@ def test_a_setting_changes_one_field_and_nothing_else():
     changed = with_settings(fast(), ["schedule.rays=17"])
     assert changed.schedule.rays == 17
     assert with_settings(changed, [f"schedule.rays={fast().schedule.rays}"]) == fast()
+
+
+def test_the_example_in_the_documentation_can_be_set():
+    example = re.search(r"``(\S+=\S+)``", with_settings.__doc__).group(1)
+    assert with_settings(fast(), [example]) != fast()
 
 
 def test_values_that_are_no_json_are_text():

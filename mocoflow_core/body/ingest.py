@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -27,6 +28,9 @@ from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 
 FileCoordinates = Literal["world", "camera", "camera-root-centred"]
+
+# What numpy raises for files of all sorts; a TypeError where the file is a single array.
+_UNREADABLE = (ValueError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +113,14 @@ def _read(
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+    except _UNREADABLE as error:
         raise InputError(
-            f"{path.name} must be a NumPy .npz of plain arrays",
-            f"{error}".splitlines()[0][:80],
-            "Write it with numpy.savez.",
+            f"{path.name} must be an .npz with vertices, faces and frame_indices as plain arrays",
+            _what_it_is(path),
+            "Export it again with numpy.savez.",
         ) from error
-    missing = sorted({"vertices", "faces", "frame_indices"} - arrays.keys())
+    needed = ("faces", "frame_indices", "vertices")
+    missing = [name for name in needed if not isinstance(arrays.get(name), np.ndarray)]
     if missing:
         raise InputError(
             f"{path.name} must hold vertices, faces and frame_indices",
@@ -132,6 +137,15 @@ def _read(
         None if regressor is None else regressor.astype(np.float32),
     )
     return meshes, _description(path, arrays, described)
+
+
+def _what_it_is(path: Path) -> str:
+    """Why NumPy cannot read a file, in words of our own: its words are about pickles."""
+    if not path.stat().st_size:
+        return "an empty file"
+    if not zipfile.is_zipfile(path):
+        return "a file that is no .npz archive"
+    return "an archive with damaged entries or Python objects"
 
 
 def _description(

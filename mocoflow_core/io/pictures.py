@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mocoflow_core.errors import InputError
+from mocoflow_core.io.whole_file import whole_file
 
 
 def as_bytes(unit: NDArray[np.floating]) -> NDArray[np.uint8]:
@@ -17,9 +18,13 @@ def as_bytes(unit: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """An RGB (H, W, 3) or grey (H, W) picture; its folder is made where it is missing."""
+    """An RGB (H, W, 3) or grey (H, W) picture; its folder is made where it is missing.
+
+    The file appears complete or not at all.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(pixels).save(path, compress_level=3)
+    with whole_file(path) as beside:
+        Image.fromarray(pixels).save(beside, compress_level=3)
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
+from mocoflow_core.io.whole_file import whole_file
 
 Image = NDArray[np.uint8]  # (H, W, 3) sRGB-encoded
 
@@ -61,8 +62,11 @@ def read_frames(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, Imag
 
 
 def write_video(path: Path, frames: Iterable[Image], fps: float) -> None:
-    """Write H.264 in yuv420p, which every browser plays. Odd sizes are padded by one pixel."""
-    with av.open(str(path), mode="w") as container:
+    """Write H.264 in yuv420p, which every browser plays. Odd sizes are padded by one pixel.
+
+    The file appears complete or not at all.
+    """
+    with whole_file(path) as beside, av.open(str(beside), mode="w") as container:
         stream = None
         for image in frames:
             even = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), "edge")

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor
 from pydantic import BaseModel, ConfigDict
 
+from mocoflow_core.capture.frame_selection import select_frames
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.orbit import moved_around
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.io.video import write_video
@@ -27,7 +29,10 @@ VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 
 class ViewRequest(BaseModel):
-    """Which views are wanted. Without frames, times or fps: every working frame."""
+    """Which views are wanted. Without frames, times or fps: the clip at its working rate.
+
+    Beside frames or times, ``fps`` is the rate of the video that they are put into.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -54,13 +59,15 @@ def render_novel_views(
     """Write a video, one PNG, or a folder of ``%06d.png``; give the number of pictures.
 
     Frames are named by their source number, other times by their position. Raises InputError for
-    an unknown camera, a time outside the clip, or a background that is neither colour nor picture.
+    an unknown camera, two choices of times, a time outside the clip, a background that is neither colour nor picture, and
+    a full disk.
     """
+    _require_one_choice(request, out)
     scene = TrainedScene.open(trained)
     shots = _shots(run, scene, request)
     background = _background(request.background, shots[0].camera)
     # More than one thread only where the optimisation has measured that it pays.
-    with torch_threads(1):
+    with torch_threads(1), full_disk_is_bad_input(str(out)):
         pictures = _pictures(scene, shots, background, progress)
         _write(pictures, len(shots), out, request.fps or _clip(run)["fps"])
     return len(shots)
@@ -69,7 +76,7 @@ def render_novel_views(
 def _write(
     pictures: Iterator[tuple[Shot, NDArray[np.uint8]]], count: int, out: Path, fps: float
 ) -> None:
-    if out.suffix.lower() in VIDEO_SUFFIXES:
+    if _is_video(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_video(out, (picture for _, picture in pictures), fps)
     elif out.suffix.lower() == ".png":
@@ -110,6 +117,23 @@ def _shots(run: RunRecord, scene: TrainedScene, request: ViewRequest) -> list[Sh
     ]
 
 
+def _require_one_choice(request: ViewRequest, out: Path) -> None:
+    """Raise InputError where one choice of times would have to be ignored for another."""
+    if request.frames and request.times_s:
+        raise InputError("One choice of times", "--frames and --times", "Leave one of them out.")
+    listed = "--frames" if request.frames else "--times" if request.times_s else ""
+    if listed and request.fps is not None and not _is_video(out):
+        raise InputError(
+            f"--fps beside {listed} is the rate of a video",
+            out.name,
+            f"Give an .mp4, or leave out --fps or {listed}.",
+        )
+
+
+def _is_video(out: Path) -> bool:
+    return out.suffix.lower() in VIDEO_SUFFIXES
+
+
 def _moments(run: RunRecord, request: ViewRequest) -> list[tuple[int, float]]:
     """Numbers for the files, and normalised times."""
     clip = _clip(run)
@@ -118,8 +142,7 @@ def _moments(run: RunRecord, request: ViewRequest) -> list[tuple[int, float]]:
     if request.times_s:
         found = [(number, s / max(duration_s, 1e-9)) for number, s in enumerate(request.times_s)]
     elif request.frames or request.fps is None:
-        step = max(round(source_fps / clip["fps"]), 1)
-        frames = request.frames or tuple(range(int(first), int(last) + 1, step))
+        frames = request.frames or _at_working_rate(clip)
         found = [(frame, (frame - first) / max(last - first, 1)) for frame in frames]
     else:
         count = int(duration_s * request.fps) + 1
@@ -132,6 +155,14 @@ def _moments(run: RunRecord, request: ViewRequest) -> list[tuple[int, float]]:
             "Choose times inside.",
         )
     return found
+
+
+def _at_working_rate(clip: dict[str, float]) -> tuple[int, ...]:
+    """Frames as they were selected for training, those that repeat another among them."""
+    filmed = np.arange(int(clip["first_frame"]), int(clip["last_frame"]) + 1, dtype=np.int32)
+    none = np.empty(0, np.int32)
+    selection = select_frames(filmed, clip["source_fps"], clip["fps"], none, 0, 0)
+    return tuple(int(frame) for frame in selection.working)
 
 
 def _camera(run: RunRecord, name: str, longer_side_px: int | None) -> Camera:

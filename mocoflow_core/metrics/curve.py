@@ -27,8 +27,6 @@ SCHEMA = pa.schema(
 # not make the scene any better, and orchestration is reported beside it.
 CLOCKED_STAGES = (
     "extract_clip",
-    "perceive_person",
-    "fit_body",
     "ingest_meshes",
     "locate_body",
     "repair_body",
@@ -38,6 +36,9 @@ CLOCKED_STAGES = (
     "fit_motion",
     "optimise_scene",
 )
+
+# What is measured along the curve; distances to the truth are taken at the end alone.
+CURVE_METRICS = ("psnr_union", "psnr", "psnr_image", "ssim", "mask_iou", "train_psnr")
 
 # Errors that are 1 - score; the others are errors already, or PSNR.
 SIMILARITIES = ("ssim", "mask_iou", "plausibility", "oks")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from pyarrow import parquet
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 from mocoflow_core.metrics.benchmark_tables import Runs
-from mocoflow_core.metrics.curve import CurveRow, seconds_to_target
+from mocoflow_core.metrics.curve import CURVE_METRICS, CurveRow, seconds_to_target
 
 SCHEMA = pa.schema(
     [
@@ -61,14 +62,27 @@ class TargetConfig(ConfigurationPart):
 
 
 def read_target(text: str) -> Target:
-    """``psnr_union=20`` as a target. Raises InputError for anything else."""
-    metric, _, value = text.partition("=")
-    try:
-        return Target(metric.strip(), float(value))
-    except ValueError as error:
+    """``psnr_union=20`` as a target.
+
+    Raises InputError for a metric that no curve has, and for a value that is no finite number.
+    """
+    name, _, written = text.partition("=")
+    metric = name.strip()
+    if metric not in CURVE_METRICS:
         raise InputError(
-            "A target is a metric and its value", repr(text), "Write psnr_union=20."
-        ) from error
+            f"A target's metric must be one of {', '.join(CURVE_METRICS)}",
+            repr(text),
+            "Write psnr_union=20.",
+        )
+    try:
+        value = float(written)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(
+            "A target is a metric and a finite number", repr(text), "Write psnr_union=20."
+        )
+    return Target(metric, value)
 
 
 def times_to_targets(runs: Runs[CurveRow], targets: Sequence[Target]) -> list[TimeToTarget]:

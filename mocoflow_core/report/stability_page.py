@@ -10,6 +10,8 @@ import numpy as np
 from markupsafe import Markup
 from pydantic import JsonValue
 
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
+from mocoflow_core.io.whole_file import whole_file
 from mocoflow_core.report.curve_plot import svg_of
 from mocoflow_core.report.stability_plot import plot_sweeps
 from mocoflow_core.report.template import render
@@ -17,7 +19,7 @@ from mocoflow_core.stability.case import Case
 from mocoflow_core.stability.catalogue import AREAS, about
 from mocoflow_core.stability.table import StabilityRow, summarise, write_table
 
-PLOTS = "plots"
+TABLE, PLOTS, PAGE = "stability.parquet", "plots", "stability.html"
 
 
 class CaseLine(NamedTuple):
@@ -48,22 +50,36 @@ def write_stability(
 ) -> None:
     """Write ``stability.parquet``, ``plots/<area>.png`` and ``stability.html``.
 
-    The page needs nothing beside it. ``machine`` says what the seconds were measured on.
+    The page needs nothing beside it. ``machine`` says what the seconds were measured on. Raises
+    InputError where the disk is full.
     """
-    (folder / PLOTS).mkdir(parents=True, exist_ok=True)
-    write_table(rows, folder / "stability.parquet")
+    with full_disk_is_bad_input(f"The folder {folder}"):
+        folder.mkdir(parents=True, exist_ok=True)
+        # First: by its table a folder is known as one that a later run may write into.
+        with whole_file(folder / TABLE) as path:
+            write_table(rows, path)
+        # A page of an earlier run must not stand beside the table of this one.
+        (folder / PAGE).unlink(missing_ok=True)
+        _write_page(rows, machine, folder)
+
+
+def _write_page(
+    rows: Sequence[StabilityRow], machine: Mapping[str, JsonValue], folder: Path
+) -> None:
+    (folder / PLOTS).mkdir(exist_ok=True)
     areas = list(dict.fromkeys(row.area for row in rows))
     sections = []
     for area in areas:
         own = [row for row in rows if row.area == area]
         figure = plot_sweeps(own)
         if figure is not None:
-            figure.savefig(folder / PLOTS / f"{area}.png", dpi=80, facecolor="white")
+            with whole_file(folder / PLOTS / f"{area}.png") as path:
+                figure.savefig(path, dpi=80, facecolor="white")
         plot = None if figure is None else Markup(svg_of(figure))
         sections.append(AreaSection(area, about(area), _lines(own), plot))
     context = {"summary": summarise(rows), "areas": sections, "machine": machine}
-    page = render("stability.html", context)
-    (folder / "stability.html").write_text(page, encoding="utf-8")
+    with whole_file(folder / PAGE) as path:
+        path.write_text(render(PAGE, context), encoding="utf-8")
 
 
 def _lines(rows: Sequence[StabilityRow]) -> list[CaseLine]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
@@ -12,12 +14,17 @@ from numpy.typing import NDArray
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
+from mocoflow_core.io.whole_file import whole_file
 
 _COMPRESSION = [cv2.IMWRITE_PNG_COMPRESSION, 1]  # Writing is as fast as rendering; 1 is enough.
 
 
 class SceneFiles:
-    """Writes the files of one scene. Raises InputError if the folder holds anything already."""
+    """Writes the files of one scene, each whole or not at all.
+
+    Raises InputError if the folder holds anything already, and where the disk is full.
+    """
 
     def __init__(self, folder: Path) -> None:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -39,8 +46,8 @@ class SceneFiles:
         self._write_png(f"masks/{camera.name}/{frame_index:06d}.png", mask.astype(np.uint8) * 255)
 
     def write_meshes(self, meshes: MeshSequence) -> None:
-        self._folder.mkdir(parents=True, exist_ok=True)
-        meshes.save(self._folder / "meshes.npz")
+        with self._whole("meshes.npz") as path:
+            meshes.save(path)
 
     def write_truth(
         self,
@@ -50,8 +57,7 @@ class SceneFiles:
         keypoints3d: NDArray[np.float64],
     ) -> None:
         """The rendered surface (T, V, 3), (F, 3), the COCO keypoints (T, 17, 3), world metres."""
-        self._folder.mkdir(parents=True, exist_ok=True)
-        with (self._folder / "truth.npz").open("wb") as file:
+        with self._whole("truth.npz") as path, path.open("wb") as file:
             np.savez(
                 file,
                 frame_indices=frame_indices,
@@ -90,10 +96,18 @@ class SceneFiles:
             "license": "CC0-1.0",
             "attribution": attribution,
         }
-        (self._folder / "scene.json").write_text(json.dumps(description, indent=1) + "\n")
+        with self._whole("scene.json") as path:
+            path.write_text(json.dumps(description, indent=1) + "\n")
 
     def _write_png(self, name: str, pixels: NDArray[np.uint8]) -> None:
-        path = self._folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
         encoded = cv2.imencode(".png", np.ascontiguousarray(pixels), _COMPRESSION)[1]
-        path.write_bytes(encoded.tobytes())
+        with self._whole(name) as path:
+            path.write_bytes(encoded.tobytes())
+
+    @contextmanager
+    def _whole(self, name: str) -> Iterator[Path]:
+        path = self._folder / name
+        with full_disk_is_bad_input(f"The folder {self._folder}"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with whole_file(path) as beside:
+                yield beside

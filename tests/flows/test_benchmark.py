@@ -140,6 +140,7 @@ def test_elsewhere_its_cells_come_from_the_store(first, compare, toy_scene, tmp_
         ({"presets": ("fats",)}, "fast, toy"),
         ({"settings": ("schedule.ray=1",)}, "schedule.rays"),
         ({"targets": ("psnr",)}, "psnr_union=20"),
+        ({"targets": ("foo=3",)}, "metric must be one of psnr_union"),
     ],
 )
 def test_what_no_cell_could_run_with_is_refused_before_any(changes, because, tmp_path):

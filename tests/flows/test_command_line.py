@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from flows.command_line import main
+from mocoflow_core.io.video import VideoDescription, describe_video
 from tests.flows.stages import STAGES
 
 ROOT = Path(__file__).parents[2]
@@ -174,7 +175,10 @@ def refuse_inside_the_flow(reconstruct, tmp_path):
         store = tmp_path / "fresh"
         with pytest.raises(InputError, match=because):
             reconstruct(scene, tmp_path / "out", store=str(store), **changes)
-        assert not list(store.glob("*/*/manifest.json")) or because
+        # Sound parts may have been read, but nothing is built on a damaged scene.
+        done = {manifest.parent.parent.name for manifest in store.glob("*/*/manifest.json")}
+        assert done <= set(STAGES[: STAGES.index("repair_body")])
+        assert not json.loads((tmp_path / "out" / "run.json").read_text())["finished"]
 
     return run
 
@@ -227,12 +231,12 @@ def with_meshes_in_millimetres(scene, describe):
     ("damage", "because"),
     [
         (without_masks_and_background, "masks or a background"),
-        (with_a_mask_of_another_size, "16"),
+        (with_a_mask_of_another_size, r"mask 000002\.png of cam00 .* got 16 x 16"),
         (with_a_missing_frame, "000003|frame 3|3"),
-        (with_a_video_that_cannot_be_decoded, "broken.mp4"),
-        (with_meshes_with_nan, "finite|NaN"),
-        (with_meshes_of_another_frame_count, "frame"),
-        (with_meshes_in_millimetres, "millimet|mm"),
+        (with_a_video_that_cannot_be_decoded, r"broken\.mp4 must be a video"),
+        (with_meshes_with_nan, "finite, got 1 that are not, the first at frame 0, vertex 0"),
+        (with_meshes_of_another_frame_count, "3 meshes for 8 frames"),
+        (with_meshes_in_millimetres, "Likely millimetres: multiply the vertices by 0.001"),
     ],
 )
 def test_a_damaged_scene_is_bad_input(damage, because, scene, describe, refuse_inside_the_flow):
@@ -247,7 +251,7 @@ def test_bad_input_found_by_a_stage_ends_with_exit_code_2(scene, describe, tmp_p
         *("--store", tmp_path / "store"),
     )
     assert run.returncode == 2, run.stderr
-    one_line_because(run.stderr, "m")
+    one_line_because(run.stderr, "Likely millimetres: multiply the vertices by 0.001")
 
 
 def test_the_same_render_command_gives_the_same_picture(first_run, tmp_path):
@@ -280,6 +284,32 @@ def test_a_rendered_frame_is_the_scored_view(first_run, tmp_path):
 def test_a_view_that_cannot_be_is_refused(refuse, first_run, tmp_path, option, value, because):
     out, _ = first_run
     refuse("render", out, option, value, "--out", tmp_path / "views", because=because)
+
+
+def test_a_choice_of_times_is_never_ignored_for_another(refuse, first_run, tmp_path):
+    out, _ = first_run
+    frames, times, fps = ("--frames", "2"), ("--times", "0.1"), ("--fps", "5")
+    views = ("--out", tmp_path / "views")
+    refuse("render", out, *frames, *times, *views, because="--frames and --times")
+    refuse("render", out, *frames, *fps, *views, because="--fps beside --frames")
+    refuse("render", out, *times, *fps, *views, because="--fps beside --times")
+    assert not list(tmp_path.iterdir())
+
+
+def test_fps_beside_frames_is_the_rate_of_the_video(first_run, tmp_path):
+    out, _ = first_run
+    video = tmp_path / "views.mp4"
+    run = mocoflow("render", out, "--frames", "2,4,5", "--fps", "5", "--out", video)
+    assert run.returncode == 0, run.stderr
+    assert describe_video(video) == VideoDescription(fps=5.0, frame_count=3)
+
+
+@pytest.mark.parametrize("name", ["views.mp4", "view.png"])
+def test_a_full_disk_leaves_no_half_of_a_view(refuse, first_run, tmp_path, name):
+    out, _ = first_run
+    (tmp_path / f".new.{name}").symlink_to("/dev/full")
+    refuse("render", out, "--frames", "3", "--out", tmp_path / name, because="full disk")
+    assert not list(tmp_path.iterdir())
 
 
 def test_rendering_a_folder_without_a_run_is_refused(refuse, tmp_path):

@@ -17,7 +17,7 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.io.content_key import digest_file
 from mocoflow_core.io.run_folder import read_run
 from mocoflow_core.io.store import Store
-from mocoflow_core.metrics.curve import CLOCKED_STAGES, read_curve
+from mocoflow_core.metrics.curve import CLOCKED_STAGES, CURVE_METRICS, read_curve
 from mocoflow_core.metrics.table import read_scores
 from tests.flows.stages import STAGES
 
@@ -34,7 +34,8 @@ def test_a_run_leaves_everything_that_a_user_keeps(first_run):
         "mocoflow",
         "posed_mesh",
     }
-    assert {row.metric for row in read_curve(out / "error_curve.parquet")} >= {"psnr", "mask_iou"}
+    measured = {row.metric for row in read_curve(out / "error_curve.parquet")}
+    assert measured == set(CURVE_METRICS)
     assert read_run(out) == record
     assert json.loads((out / "plan.json").read_text())["decisions"]
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
+import os
 import sys
 
 import pytest
 
 from flows.command_line import main
 from mocoflow_core.errors import InputError
+from mocoflow_core.report import stability_page
 from mocoflow_core.stability import catalogue, compositing
 from mocoflow_core.stability.table import read_table
 
@@ -85,6 +88,28 @@ def test_an_unknown_area_is_bad_input(mocoflow, tmp_path, capsys):
     assert mocoflow("--area", "se4", "--out", tmp_path / "out") == 2
     assert "se3" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("broken", ["write_table", "plot_sweeps", "render"])
+def test_what_a_full_disk_broke_off_is_done_again_in_the_same_folder(
+    mocoflow, tmp_path, capsys, monkeypatch, broken
+):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    command = ("--area", AREA, "--out", tmp_path / "out")
+    with monkeypatch.context() as patched:
+        patched.setattr(stability_page, broken, full)
+        assert mocoflow(*command) == 2
+    [line] = capsys.readouterr().err.strip().splitlines()
+    assert "full disk" in line
+    assert mocoflow(*command) == 0
+
+
+def test_several_areas_follow_one_option(mocoflow, tmp_path):
+    assert mocoflow("--area", AREA, "encoding", "--quick", "--out", tmp_path / "out") == 0
+    rows = read_table(tmp_path / "out" / "stability.parquet")
+    assert {row.area for row in rows} == {AREA, "encoding"}
 
 
 def test_a_folder_that_holds_something_else_is_refused(run, tmp_path):

@@ -6,6 +6,7 @@ import pytest
 from pyarrow import parquet
 
 from mocoflow_core.metrics.curve import (
+    CLOCKED_STAGES,
     CurveRow,
     as_error,
     read_curve,
@@ -21,6 +22,7 @@ def at(seconds: float, value: float, metric: str = "psnr") -> CurveRow:
     )
 
 
+TASKS = Path(__file__).parents[2] / "tasks"
 ROWS = [at(1, 18.0), at(2, 21.0), at(4, 20.5), at(8, 24.0), at(8, 0.9, "ssim")]
 
 
@@ -58,3 +60,7 @@ def test_spans_touch_follow_the_run_and_leave_evaluation_out() -> None:
     assert [span.name for span in spans] == ["extract_clip", "optimise_scene"]
     assert [(span.start_s, span.end_s) for span in spans] == [(0.0, 2.0), (2.0, 32.0)]
     assert training_spans(stages, "cpu_s")[-1].end_s == 43.0
+
+
+def test_the_clock_counts_stages_that_exist() -> None:
+    assert [name for name in CLOCKED_STAGES if not (TASKS / f"{name}.py").is_file()] == []

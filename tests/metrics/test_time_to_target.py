@@ -73,6 +73,15 @@ def test_a_written_target_is_a_metric_and_a_number():
             read_target(wrong)
 
 
+def test_a_target_that_no_run_could_reach_is_refused():
+    for unknown in ("foo=3", "keypoint_mm=30"):  # The second is measured, but not along the curve.
+        with pytest.raises(InputError, match="must be one of psnr_union, psnr,"):
+            read_target(unknown)
+    for endless in ("psnr=nan", "psnr=inf", "psnr=-inf"):
+        with pytest.raises(InputError, match="finite number"):
+            read_target(endless)
+
+
 def test_cpu_seconds_are_those_of_the_same_measurement():
     assert row(4.0, 7.0, 9.0).median_cpu_s == 14.0
     assert row(4.0, None, None).median_cpu_s is None

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mocoflow_core.errors import InputError
 from mocoflow_core.report.stability_page import write_stability
 from mocoflow_core.report.stability_plot import plot_sweeps
 from mocoflow_core.stability.table import StabilityRow
@@ -66,3 +67,18 @@ def test_sweeps_of_numbers_and_of_words_are_drawn(values):
 
 def test_a_single_value_is_no_sweep():
     assert plot_sweeps([row()]) is None
+
+
+def test_a_full_disk_is_bad_input_and_leaves_nothing_half_written(tmp_path):
+    (tmp_path / ".new.stability.parquet").symlink_to("/dev/full")
+    with pytest.raises(InputError, match="full disk"):
+        write_stability([row()], MACHINE, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_page_that_cannot_be_written_leaves_the_table_and_no_earlier_page(tmp_path):
+    write_stability([row()], MACHINE, tmp_path)
+    (tmp_path / ".new.stability.html").symlink_to("/dev/full")
+    with pytest.raises(InputError, match="full disk"):
+        write_stability([row()], MACHINE, tmp_path)
+    assert [path.name for path in tmp_path.rglob("stability*")] == ["stability.parquet"]

@@ -10,8 +10,10 @@ from pydantic import ValidationError
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.synthetic.catalogue import SCENES, named_scene
 from mocoflow_core.synthetic.configuration import SyntheticConfig
+from mocoflow_core.synthetic.scene_files import SceneFiles
 from mocoflow_core.synthetic.scene_writer import write_scene
 from mocoflow_core.synthetic.toy import ToyConfig, write_toy_scene
 
@@ -147,3 +149,22 @@ def test_pictures_are_what_the_reader_expects(turn_scene):
     assert mask.shape == (96, 96)
     assert set(np.unique(mask)) == {0, 255}
     assert cv2.imread(str(turn_scene / "frames/cam00/000000.png")).shape == (96, 96, 3)
+
+
+@pytest.mark.parametrize("name", ["scene.json", "meshes.npz", "truth.npz"])
+def test_a_full_disk_is_bad_input_and_leaves_no_half_of_a_file(tmp_path, name):
+    files = SceneFiles(tmp_path)
+    (tmp_path / f".new.{name}").symlink_to("/dev/full")
+    camera = Camera("cam00", 8, 8, np.eye(3), np.eye(3), np.zeros(3))
+    points = np.zeros((1, 3, 3))
+    numbers, faces = np.zeros(1, np.int32), np.array([[0, 1, 2]], np.int32)
+    write = {
+        "scene.json": lambda: files.write_description("turn", 12.0, [camera], True, ""),
+        "meshes.npz": lambda: files.write_meshes(
+            MeshSequence(numbers, points.astype(np.float32), faces)
+        ),
+        "truth.npz": lambda: files.write_truth(numbers, points, faces, points),
+    }
+    with pytest.raises(InputError, match="full disk"):
+        write[name]()
+    assert not list(tmp_path.iterdir())
