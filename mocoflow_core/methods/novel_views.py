@@ -59,8 +59,8 @@ def render_novel_views(
     """Write a video, one PNG, or a folder of ``%06d.png``; give the number of pictures.
 
     Frames are named by their source number, other times by their position. Raises InputError for
-    an unknown camera, two choices of times, a time outside the clip, a background that is neither colour nor picture, and
-    a full disk.
+    an unknown camera, two choices of times, a time outside the clip, a background that is neither
+    colour nor picture, and a full disk.
     """
     _require_one_choice(request, out)
     scene = TrainedScene.open(trained)

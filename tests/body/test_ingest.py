@@ -179,7 +179,7 @@ def test_an_archive_of_something_else_is_refused(folder):
 
 def test_pickled_objects_are_never_loaded(folder):
     np.savez(folder / "meshes.npz", vertices=np.array([{"a": 1}], object), faces=1, frame_indices=1)
-    with pytest.raises(InputError, match="plain arrays, got an archive with .* Python objects"):
+    with pytest.raises(InputError, match=r"plain arrays, got an archive with .* Python objects"):
         ingest_meshes(open_scene(folder))
 
 
