@@ -81,25 +81,29 @@ class MaskMisfit:
         ]
         self._configuration = configuration
 
-    def apart_px(self, vertices: NDArray[np.float32]) -> float:
+    def apart_px(self, vertices: NDArray[np.float32], parts: NDArray[np.int64]) -> float:
         """How far the body's outline is from the masks'; nan where no mask shows it.
 
-        Three quarters of the outline are nearer. Clothes push the whole outline outward, so a
-        distance that all points share says nothing and is taken off.
+        Three quarters of the outline are nearer. Clothes push the outline of a part outward, so a
+        distance that all points of a part share, in all frames, says nothing and is taken off.
 
         Args:
             vertices: (T, V, 3) the estimate at the frames looked at.
+            parts: (V,) number of each vertex's part.
         """
-        off = [np.zeros(0)]
+        off, part = [np.zeros(0)], [np.zeros(0, np.int64)]
         for posed, mask in zip(vertices, self._masks, strict=True):
             body = self._topology.outline(posed, self._camera)
             pairs = self._pairs(body, mask)
             apart = body.pixels[pairs.body] - mask.pixels[pairs.mask]
             off.append((apart * mask.normals[pairs.mask]).sum(-1))
-        distances = np.concatenate(off)
+            part.append(parts[body.edges[pairs.body][:, 0]])
+        distances, part_of = np.concatenate(off), np.concatenate(part)
         if not len(distances):
             return float("nan")
-        return float(np.percentile(np.abs(distances - np.median(distances)), 75))
+        for label in np.unique(part_of):
+            distances[part_of == label] -= np.median(distances[part_of == label])
+        return float(np.percentile(np.abs(distances), 75))
 
     def look(self, correction: JointCorrection) -> _Targets:
         """The points that belong together as the body stands now."""

@@ -57,11 +57,17 @@ class RepairConfig(ConfigurationPart):
 def outlines_apart(clip: Clip, meshes: MeshSequence, configuration: RepairConfig) -> float:
     """How far the body's outline is from the masks', in pixels; nan where no mask shows it.
 
-    See ``MaskMisfit.apart_px``. Looks at the training frames alone.
+    What clothes can explain, part by part, is taken off: see ``MaskMisfit.apart_px``. Looks at the
+    training frames alone.
     """
     looked_at, rows = _training_frames(clip, meshes)
     masks = MaskMisfit(clip, looked_at, rows, meshes.faces, configuration.masks)
-    return masks.apart_px(meshes.vertices[rows])
+    vertices = meshes.vertices[rows]
+    whole_px = masks.apart_px(vertices, np.zeros(vertices.shape[1], np.int64))
+    if not whole_px > configuration.masks.agreeing_px:
+        return whole_px
+    skeleton = articulate(meshes.vertices, meshes.faces, configuration.parts, configuration.blend_m)
+    return masks.apart_px(vertices, skeleton.weights.argmax(1))
 
 
 def repair_body(

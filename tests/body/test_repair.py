@@ -2,12 +2,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from mocoflow_core.body.mask_misfit import MaskMisfitConfig, expected_share
+from mocoflow_core.body.mask_misfit import MaskMisfit, MaskMisfitConfig, expected_share
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
 from mocoflow_core.body.repair import RepairConfig, RoundsConfig, outlines_apart, repair_body
@@ -174,6 +175,21 @@ def test_where_no_error_is_expected_the_estimate_is_left_as_it_came(
     assert expected_share(apart_px, CONFIGURATION.masks) > 0
     assert expected_share(CONFIGURATION.masks.agreeing_px, CONFIGURATION.masks) == 0
     assert repair_body(filmed(truth), bent, 0.0, CONFIGURATION, silent) is bent
+
+
+def test_clothes_that_stand_off_one_part_are_no_error_of_the_estimate(truth: MeshSequence) -> None:
+    clip = filmed(truth)
+    kernel = np.ones((7, 7), np.uint8)
+    masks = clip.masks.copy()
+    half = SIZE // 2
+    for mask in masks:
+        mask[half:] = cv2.dilate(mask.astype(np.uint8), kernel)[half:] > 0
+    rows = np.arange(FRAMES)
+    misfit = MaskMisfit(replace(clip, masks=masks), rows, rows, truth.faces, CONFIGURATION.masks)
+    # y points down: the lower half of the picture shows the vertices of larger y.
+    dressed = (truth.vertices[0, :, 1] > 0).astype(np.int64)
+    whole = misfit.apart_px(truth.vertices, np.zeros_like(dressed))
+    assert misfit.apart_px(truth.vertices, dressed) < 0.5 * whole
 
 
 def test_thresholds_out_of_order_are_refused() -> None:
