@@ -48,7 +48,7 @@ class Extent(NamedTuple):
 
 
 QUICK = Extent(
-    ("turn,frames=24", "dance_noise6,frames=24", "turn_loose,frames=24"), range(1), range(3), 2
+    ("turn,frames=24", "dance_noise6,frames=24", "turn_loose,frames=24"), range(1), range(2), 2
 )
 FULL = Extent((*QUICK.scenes, "spin,frames=24"), range(2), range(3), 3)
 
