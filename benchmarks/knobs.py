@@ -54,9 +54,9 @@ def _shell(margin_m: float) -> Setting:
 
 
 def _rates(factor: float) -> Setting:
-    """All rates of the optimiser together: they cost nothing, but decide what a step buys."""
+    """Rates of the canonical field: they cost nothing, but decide what a step buys."""
     schedule = fast().schedule
-    names = ("rate_features", "rate_networks", "rate_motion")
+    names = ("rate_features", "rate_networks")
     changes = tuple(f"schedule.{name}={getattr(schedule, name) * factor:g}" for name in names)
     return Setting("rates", f"x {factor:g}", changes)
 
@@ -84,7 +84,7 @@ def _mm(length_m: float) -> str:
 STEPS = "steps"
 KNOBS = (
     Knob(STEPS, tuple(map(_steps, (94, 188, 375, 750, 1500, 3000))), ("188", "375", "1500")),
-    Knob("rays", _field("rays", "schedule.rays", 192, 384, 768, 1536), ("384", "1536")),
+    Knob("rays", _field("rays", "schedule.rays", 192, 384, 768, 1536), ("192", "768")),
     Knob(
         "samples",
         _length("samples", "sampling.step_m", 0.02, 0.014, 0.01, 0.007, 0.005),
@@ -93,7 +93,7 @@ KNOBS = (
     Knob(
         "finest cell",
         _length("finest cell", "canonical.finest_m", 0.02, 0.014, 0.01, 0.007, 0.005),
-        ("14 mm", "7 mm"),
+        ("20 mm", "10 mm"),
     ),
     Knob("levels", _field("levels", "canonical.levels", 1, 2, 3, 4), ("2",)),
     Knob("features", _field("features", "canonical.channels", 2, 4, 8, 16), ("4",)),

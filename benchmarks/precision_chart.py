@@ -38,7 +38,12 @@ def write_chart(rows: Sequence[Row], path: Path) -> None:
         for axes in places[len(scenes) :]:
             axes.set_axis_off()
         figure.legend(
-            handles=_legend(points), loc="outside lower center", ncols=6, frameon=False, fontsize=8
+            handles=_legend(points),
+            loc="outside lower center",
+            ncols=6,
+            frameon=False,
+            fontsize=8,
+            handlelength=3.5,
         )
         figure.savefig(path, dpi=110, facecolor="white")
 
@@ -61,7 +66,7 @@ def _panel(axes: Axes, points: Sequence[Point]) -> None:
         if line:
             colour, style = _look(number)
             _line(axes, sorted([*line, default], key=lambda p: p.cpu_s), colour, style)
-    budgets = [p for p in points if p.knob == BUDGET]
+    budgets = [p for p in points if p.knob == BUDGET and p.steps > 0]
     _line(axes, budgets, WARM, (0, (5, 3)))
     for point in points:
         if point.knob == JOINT:

@@ -36,7 +36,7 @@ def write_document(rows: Sequence[Row], command: str, path: Path) -> None:
 
 def _heading(rows: Sequence[Row], command: str) -> list[str]:
     machine = describe_machine()
-    spent_s = sum(row.optimisation_wall_s for row in rows)
+    spent_s = sum(row.optimisation_s for row in rows)
     return [
         "# Work against precision",
         "",
@@ -63,7 +63,7 @@ def _defaults(points: Sequence[Point]) -> list[str]:
     for scene in _scenes(points):
         p = default_of(points, scene)
         lines.append(
-            f"| {scene} | {p.seeds} | {p.preparation_cpu_s:.1f} | {p.optimisation_cpu_s:.1f} "
+            f"| {scene} | {p.seeds} | {p.preparation_s:.1f} | {p.optimisation_s:.1f} "
             f"| {p.psnr_union:.2f}{_range(p)} | {p.mask_iou:.3f} |"
         )
     return lines
@@ -90,7 +90,7 @@ def _sweep(points: Sequence[Point]) -> list[str]:
 
 
 def _joint(rows: Sequence[Row]) -> list[str]:
-    """The best settings alone and together, with all seeds that they share with the defaults."""
+    """The best settings together, with all seeds that they share with the defaults."""
     points = points_of(rows)
     candidates = [
         (knob, value)
@@ -105,7 +105,7 @@ def _joint(rows: Sequence[Row]) -> list[str]:
     lines = [
         "## Around the best",
         "",
-        f"The settings with the largest gains, alone and together; {seeds} seeds.",
+        f"The settings with the largest gains together; {seeds} seeds.",
         "",
         f"| setting | {' | '.join(scenes)} | beats the default |",
         f"|-|{'-|' * len(scenes)}-|",
@@ -128,9 +128,11 @@ def _budgets(points: Sequence[Point]) -> list[str]:
     lines = [
         "## What a budget buys",
         "",
-        "`--budget SECONDS` of wall time on the training clock, preparation included; medians over "
-        "the scenes, with the",
-        "least and the most. Where the default schedule is done earlier, the rest is given back.",
+        "`schedule.budget_s`, which `--budget` sets: seconds of the training clock, preparation "
+        "included; here CPU seconds, as on",
+        "one idle core. Medians over the scenes, with the least and the most. No steps: the "
+        "preparation took longer. Where the",
+        "default schedule is done earlier, the rest is given back.",
         "",
         "| budget | used, s | steps | rays | PSNR, dB | IoU |",
         "|-:|-:|-:|-:|-:|-:|",
@@ -139,7 +141,7 @@ def _budgets(points: Sequence[Point]) -> list[str]:
         if knob == BUDGET:
             runs = _on_every_scene(points, knob, value)
             lines.append(
-                f"| {value} | {_spread([p.wall_s for p in runs], '.1f')} "
+                f"| {value} | {_spread([p.cpu_s for p in runs], '.1f')} "
                 f"| {_spread([p.steps for p in runs], '.0f')} "
                 f"| {_spread([p.rays for p in runs], '.0f')} "
                 f"| {_spread([p.psnr_union for p in runs], '.1f')} "

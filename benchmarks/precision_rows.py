@@ -10,7 +10,7 @@ from typing import NamedTuple, get_type_hints
 
 
 class Row(NamedTuple):
-    """One run. Seconds of the training clock, preparation and optimisation apart."""
+    """One run. CPU seconds of the training clock, preparation and optimisation apart."""
 
     scene: str
     knob: str
@@ -19,10 +19,8 @@ class Row(NamedTuple):
     seed: int
     steps: int
     rays: int
-    preparation_wall_s: float
-    preparation_cpu_s: float
-    optimisation_wall_s: float
-    optimisation_cpu_s: float
+    preparation_s: float
+    optimisation_s: float
     psnr_union: float
     mask_iou: float
 
@@ -36,9 +34,8 @@ class Point(NamedTuple):
     seeds: int
     steps: int
     rays: int
-    preparation_cpu_s: float
-    optimisation_cpu_s: float
-    wall_s: float  # of the whole training clock
+    preparation_s: float
+    optimisation_s: float
     psnr_union: float
     lowest_psnr: float
     highest_psnr: float
@@ -47,7 +44,7 @@ class Point(NamedTuple):
     @property
     def cpu_s(self) -> float:
         """Of the whole training clock."""
-        return self.preparation_cpu_s + self.optimisation_cpu_s
+        return self.preparation_s + self.optimisation_s
 
 
 def write_rows(rows: Iterable[Row], path: Path) -> None:
@@ -92,9 +89,8 @@ def _point(rows: list[Row]) -> Point:
         len(rows),
         round(median(row.steps for row in rows)),
         round(median(row.rays for row in rows)),
-        median(row.preparation_cpu_s for row in rows),
-        median(row.optimisation_cpu_s for row in rows),
-        median(row.preparation_wall_s + row.optimisation_wall_s for row in rows),
+        median(row.preparation_s for row in rows),
+        median(row.optimisation_s for row in rows),
         median(errors),
         min(errors),
         max(errors),

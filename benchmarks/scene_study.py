@@ -1,11 +1,13 @@
 """One scene of a study: prepared once, trained many times, scored at views of other cameras.
 
 What the flow does between a scene folder and its scores, on the core's own functions and without
-a store. The scene's meshes must be located: no study searches for them.
+a store. The scene's meshes must be located: no study searches for them. The training clock shows
+CPU seconds, also to a budget: what one idle core would take, whatever else the machine does.
 """
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -27,7 +29,7 @@ from mocoflow_core.planning.preparation import decide_frames, decide_preparation
 from mocoflow_core.planning.repair import repair_where_needed
 from mocoflow_core.presets import Configuration
 from mocoflow_core.rendering.trained_scene import TrainedScene
-from mocoflow_core.training.clock import TrainingClock
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.optimise_scene import Learned, OptimisationResult, optimise_scene
 from mocoflow_core.training.pretrain_density import pretrain_density
@@ -44,7 +46,7 @@ class PreparedScene:
     """What the optimisation starts from; ``spent`` is the training clock up to there."""
 
     def __init__(self, scene: Scene, configuration: Configuration) -> None:
-        clock = TrainingClock()
+        clock = TrainingClock(now=_cpu_now)
         self.clip, self.plan, self.density, self.motion = _prepare(scene, configuration)
         self.spent = clock.read()
         self._views = _views(scene, self.clip, configuration)
@@ -95,6 +97,7 @@ class PreparedScene:
             self.spent,
             folder,
             lambda share, text: None,
+            clock=TrainingClock(now=_cpu_now),
         )
 
     def _scores(self, trained: TrainedScene) -> dict[str, float]:
@@ -104,6 +107,11 @@ class PreparedScene:
             metric: float(np.mean([row.value for row in rows if row.metric == metric]))
             for metric in dict.fromkeys(row.metric for row in rows)
         }
+
+
+def _cpu_now() -> Seconds:
+    cpu_s = time.process_time()
+    return Seconds(cpu_s, cpu_s)
 
 
 def _prepare(

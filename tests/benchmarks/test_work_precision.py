@@ -13,8 +13,7 @@ from mocoflow_core.presets import fast
 
 def _row(knob="default", value="", cpu_s=20.0, psnr=20.0, scene="turn", seed=0):
     """A run whose preparation took 4 s of ``cpu_s``."""
-    spent = (4.0, 4.0, cpu_s - 4.0, cpu_s - 4.0)
-    return Row(scene, knob, value, "", seed, 750, 768, *spent, psnr, 0.97)
+    return Row(scene, knob, value, "", seed, 750, 768, 4.0, cpu_s - 4.0, psnr, 0.97)
 
 
 def _point(**values) -> Point:
