@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test stability check format
+.PHONY: install demo test stability bench check format
 
 install: $(INSTALLED)
 
@@ -20,6 +20,9 @@ test: install
 
 stability: install
 	$(BIN)/mocoflow stability --out stability
+
+bench: install
+	$(BIN)/python -m benchmarks.work_precision
 
 check: install
 	$(BIN)/ruff format --check .

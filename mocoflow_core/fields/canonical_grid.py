@@ -21,7 +21,8 @@ from mocoflow_core.geometry.grid import SparseGrids, weighted_rows
 class CanonicalConfig(ConfigurationPart):
     """Sizes of the canonical field."""
 
-    finest_m: float = Field(0.01, gt=0, description="cell of the finest level, metres")
+    # 10 and 7 mm cost more and show less at unseen views: benchmarks/work_precision.md.
+    finest_m: float = Field(0.014, gt=0, description="cell of the finest level, metres")
     level_ratio: float = Field(2.8, gt=1, description="cell size from one level to the next")
     levels: int = Field(3, ge=1)
     channels: int = Field(8, ge=1, description="features per level")

@@ -1,0 +1,149 @@
+"""One scene of a study: prepared once, trained many times, scored at views of other cameras.
+
+What the flow does between a scene folder and its scores, on the core's own functions and without
+a store. The scene's meshes must be located: no study searches for them. The training clock shows
+CPU seconds, also to a budget: what one idle core would take, whatever else the machine does.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+
+from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.capture.clip import Clip
+from mocoflow_core.capture.extract import ClipNeeds, extract_clip, extract_evaluation
+from mocoflow_core.capture.scene import Scene
+from mocoflow_core.fields.canonical_density import CanonicalDensity
+from mocoflow_core.fields.scene_shape import SceneShape
+from mocoflow_core.methods.rendered_views import ScoredView, TrainedRenderer, scored_views
+from mocoflow_core.methods.scored_views import Subject, few_views, score_views
+from mocoflow_core.metrics.score import EvaluationConfig
+from mocoflow_core.planning.inspection import inspect_scene
+from mocoflow_core.planning.plan import ScenePlan, plan_scene
+from mocoflow_core.planning.preparation import decide_frames, decide_preparation
+from mocoflow_core.planning.repair import repair_where_needed
+from mocoflow_core.presets import Configuration
+from mocoflow_core.rendering.trained_scene import TrainedScene
+from mocoflow_core.training.clock import Seconds, TrainingClock
+from mocoflow_core.training.fit_motion import MotionStart, fit_motion
+from mocoflow_core.training.optimise_scene import Learned, OptimisationResult, optimise_scene
+from mocoflow_core.training.pretrain_density import pretrain_density
+
+
+class Trained(NamedTuple):
+    """One optimisation, and its mean scores over a few views of other cameras."""
+
+    result: OptimisationResult
+    scores: dict[str, float]
+
+
+class PreparedScene:
+    """What the optimisation starts from; ``spent`` is the training clock up to there."""
+
+    def __init__(self, scene: Scene, configuration: Configuration) -> None:
+        clock = TrainingClock(now=_cpu_now)
+        self.clip, self.plan, self.density, self.motion = _prepare(scene, configuration)
+        self.spent = clock.read()
+        self._views = _views(scene, self.clip, configuration)
+        self._evaluation: EvaluationConfig = configuration.evaluation
+        self._opened: TrainedScene | None = None
+
+    def train(self, configuration: Configuration, seed: int) -> Trained:
+        """Optimise as the plan says and score the result."""
+        with TemporaryDirectory() as folder:
+            result = self._optimise(configuration, seed, Path(folder))
+            trained = TrainedScene.open(Path(folder))
+        if self._opened is not None:
+            trained.share_bodies(self._opened)
+        self._opened = trained
+        return Trained(result, self._scores(trained))
+
+    def _optimise(
+        self, configuration: Configuration, seed: int, folder: Path
+    ) -> OptimisationResult:
+        plan, canonical, sampling = self.plan, configuration.canonical, configuration.sampling
+        canonical = canonical.model_copy(update={"finest_m": plan.no_finer(canonical.finest_m)})
+        sampling = sampling.model_copy(update={"step_m": plan.no_finer(sampling.step_m)})
+        shape = SceneShape(
+            canonical=canonical,
+            motion=configuration.motion,
+            times=tuple(self.clip.times[~self.clip.held_out].tolist()),
+            shell_width_m=plan.shell_width_m,
+            inner_depth_m=sampling.inner_depth_m,
+            step_m=sampling.step_m,
+            residual=plan.needs("motion_residual"),
+            light=plan.light,
+        )
+        learned = Learned(
+            plan.needs("motion_residual"),
+            plan.needs("motion_consensus"),
+            plan.needs("appearance_codes"),
+        )
+        return optimise_scene(
+            self.clip,
+            self.density,
+            self.motion,
+            shape,
+            learned,
+            configuration.losses,
+            sampling,
+            configuration.schedule,
+            seed,
+            self.spent,
+            folder,
+            lambda share, text: None,
+            clock=TrainingClock(now=_cpu_now),
+        )
+
+    def _scores(self, trained: TrainedScene) -> dict[str, float]:
+        renderer = TrainedRenderer(trained, self.clip)
+        rows = score_views(Subject("", 0), "", self._views, renderer, self._evaluation)
+        return {
+            metric: float(np.mean([row.value for row in rows if row.metric == metric]))
+            for metric in dict.fromkeys(row.metric for row in rows)
+        }
+
+
+def _cpu_now() -> Seconds:
+    cpu_s = time.process_time()
+    return Seconds(cpu_s, cpu_s)
+
+
+def _prepare(
+    scene: Scene, configuration: Configuration
+) -> tuple[Clip, ScenePlan, CanonicalDensity, MotionStart]:
+    choose = configuration.plan
+    given = ingest_meshes(scene)
+    preparation = decide_preparation(inspect_scene(scene, given), choose)
+    needed = {decision.name: decision.needed for decision in preparation}
+    needs = ClipNeeds(
+        background=needed["background_extraction"],
+        masks=needed["mask_segmentation"],
+        repeated_frames=choose.repeated_frames == "on",
+    )
+    clip = extract_clip(scene, configuration.capture, needs)
+    meshes, repair = repair_where_needed(
+        clip, given.meshes, configuration.repair, choose.body_repair, lambda share, text: None
+    )
+    frames = decide_frames(0, len(clip.frames), choose)
+    plan = plan_scene(clip, meshes, (*preparation, frames, repair), choose)
+    density = pretrain_density(meshes, plan.canonical_frame, configuration.density)
+    motion = fit_motion(
+        clip,
+        meshes,
+        density,
+        plan.shell_width_m,
+        plan.needs("motion_fields"),
+        configuration.motion,
+    )
+    return clip, plan, density, motion
+
+
+def _views(scene: Scene, clip: Clip, configuration: Configuration) -> list[ScoredView]:
+    others = extract_evaluation(scene, clip.frame_indices, configuration.capture)
+    return few_views(scored_views(clip, others, configuration.evaluation), configuration.evaluation)
