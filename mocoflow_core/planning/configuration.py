@@ -30,7 +30,7 @@ class PlanConfig(ConfigurationPart):
     still_px: float = Field(
         0.5, ge=0, description="A body whose points move less than this, in pixels, is still."
     )
-    # Up to there a residual motion gained nothing and took half of a step: benchmarks/decisions.md.
+    # Up to there a residual motion gained 0.1 dB and doubled a step: benchmarks/decisions.md.
     consistent_m: float = Field(
         0.09, ge=0, description="Outlines nearer than this, in metres, leave nothing to correct."
     )

@@ -110,7 +110,7 @@ def _residual(agreement: MaskAgreement, moves: bool, configuration: PlanConfig) 
     # An unknown agreement (no mask shows the person) is no evidence of a good one.
     wrong = not off_m <= configuration.consistent_m
     if not wrong:
-        reason = "a residual motion was never seen to gain anything where outlines are so near"
+        reason = "a residual motion gains too little for its time where outlines are so near"
     else:
         reason = "the body's outline is off the masks"
     return Decision(
