@@ -30,7 +30,7 @@ _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
 _START_RAYS = 1024  # that tell how large the losses are at the start
 
-Score = Callable[[SceneField], float]
+Score = Callable[[], float]
 
 
 class TrainingRun:
@@ -171,8 +171,7 @@ class TrainingRun:
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
         schedule, step = self.schedule, self.progress.step
-        bands = self.field.motion.residual_to_canonical.encoding.bands
-        self.field.anneal(band_alpha(share, schedule.coarse_share, bands))
+        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands))
         factor = rate_factor(share, schedule.final_rate) * self.guard.rate_scale
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
@@ -220,7 +219,7 @@ class TrainingRun:
 
     def _train_psnr(self) -> float | None:
         with self.clock.paused():
-            return None if self.score is None else self.score(self.field)
+            return None if self.score is None else self.score()
 
     def _save(self) -> None:
         if self.guard.problem({}) is not None:
@@ -233,12 +232,9 @@ class TrainingRun:
 
 
 def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:
-    features = list(field.canonical.tables)
-    networks = [p for n, p in field.canonical.named_parameters() if not n.startswith("tables.")]
-    motion = [*field.motion.parameters(), field.appearance]
+    rates = (schedule.rate_features, schedule.rate_networks, schedule.rate_motion)
     groups = [
-        {"params": features, "lr": schedule.rate_features},
-        {"params": networks, "lr": schedule.rate_networks},
-        {"params": motion, "lr": schedule.rate_motion},
+        {"params": parameters, "lr": rate}
+        for parameters, rate in zip(field.rate_groups(), rates, strict=True)
     ]
     return torch.optim.Adam(groups, betas=(0.9, 0.99), eps=1e-10, fused=True)
