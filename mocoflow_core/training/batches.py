@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -28,6 +29,16 @@ class Batch:
     has_mask: Tensor  # (R,) 0 where the frame came without a mask
     background: Tensor  # (R, 3)
     jitter: Tensor  # (R, J) in [0, 1), as many as the scene's rays take
+
+
+class PixelSource(Protocol):
+    """Where a step's rays come from."""
+
+    def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
+        """Random rays of a few frames."""
+
+    def problem(self, batch: Batch) -> str | None:
+        """What is wrong with a batch, in words; None if all is well."""
 
 
 class TrainingPixels:

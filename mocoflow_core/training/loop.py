@@ -11,7 +11,7 @@ import torch
 
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
-from mocoflow_core.training.batches import TrainingPixels
+from mocoflow_core.training.batches import PixelSource
 from mocoflow_core.training.checkpoint import (
     Progress,
     Restored,
@@ -37,20 +37,20 @@ class TrainingRun:
     """One optimisation, started or resumed.
 
     ``score`` is ``train_psnr`` of the held-out pixels, asked while the clock stands still; each
-    snapshot hands the curve so far to ``watch``.
+    snapshot hands the curve so far to ``watch``. Without a watcher none are kept.
     """
 
     def __init__(
         self,
         field: SceneField,
         objective: Objective,
-        pixels: TrainingPixels,
+        pixels: PixelSource,
         schedule: ScheduleConfig,
         seed: int,
         before: Seconds,
         workspace: Path,
         progress: Callable[[float, str], None],
-        watch: Callable[[list[Snapshot]], None],
+        watch: Callable[[list[Snapshot]], None] | None,
         score: Score | None,
         clock: TrainingClock,
     ) -> None:
@@ -171,7 +171,8 @@ class TrainingRun:
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
         schedule, step = self.schedule, self.progress.step
-        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands))
+        limits = (schedule.first_bands, schedule.last_bands)
+        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands, *limits))
         factor = rate_factor(share, schedule.final_rate) * self.guard.rate_scale
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
@@ -209,8 +210,8 @@ class TrainingRun:
             self._snapshot()
 
     def _snapshot(self) -> None:
-        if self.guard.problem({}) is not None:
-            return  # the next step refuses it
+        if self.watch is None or self.guard.problem({}) is not None:
+            return  # a bad state is refused by the next step
         self.progress.snapshot_s = self.progress.elapsed.wall
         psnr = self._train_psnr()
         with self.clock.paused():
@@ -237,4 +238,5 @@ def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optim
         {"params": parameters, "lr": rate}
         for parameters, rate in zip(field.rate_groups(), rates, strict=True)
     ]
-    return torch.optim.Adam(groups, betas=(0.9, 0.99), eps=1e-10, fused=True)
+    betas = (0.9, schedule.adam_beta2)
+    return torch.optim.Adam(groups, betas=betas, eps=schedule.adam_epsilon, fused=True)

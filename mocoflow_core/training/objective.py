@@ -52,9 +52,8 @@ class ShellObjective:
         """Consensus and regularity of the motion at a few samples that have density."""
         weights, shell, scene = self.losses, rendered.shell, self.scene
         solid = (rendered.density.detach() > weights.density_threshold).nonzero()[:, 0]
-        pick = torch.randint(
-            max(len(solid), 1), (min(weights.consensus_points, len(solid)),), generator=generator
-        )
+        count = min(weights.consensus_points or len(solid), len(solid))
+        pick = torch.randint(max(len(solid), 1), (count,), generator=generator)
         chosen = solid[pick]
         points, body, row = shell.samples.points[chosen], shell.canonical[chosen], shell.row[chosen]
         motion, moments = scene.field.motion, scene.moments
