@@ -69,7 +69,7 @@ def reconstruct(
 
     evaluation = extract_evaluation(where, request.others, clip, chosen.capture)
     views = render_views(
-        where, trained, clip, evaluation, bodies, chosen.evaluation, chosen.presentation
+        where, trained, plan, clip, evaluation, bodies, chosen.evaluation, chosen.presentation
     )
     name = request.scene.description.name
     scores = score_views(

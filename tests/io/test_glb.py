@@ -26,7 +26,7 @@ def mesh():
         vertices=vertices,
         faces=np.asarray(BOX.faces, np.int32),
         colours=rng.random((len(vertices), 3)).astype(np.float32),
-        poses=np.stack([vertices + [k, 0, 0] for k in range(3)]).astype(np.float32),
+        poses=np.stack([vertices + np.array([k, 0, 0]) for k in range(3)]).astype(np.float32),
         pose_names=("frame 4", "frame 5", "frame 8"),
         times_s=TIMES_S,
     )
@@ -81,7 +81,10 @@ def test_all_accessors_lie_side_by_side_and_state_their_true_bounds(path):
 def test_what_the_format_wants_bounded_is_bounded(path):
     document, _ = chunks(path)
     (primitive,) = document["meshes"][0]["primitives"]
-    bounded = [primitive["attributes"]["POSITION"], document["animations"][0]["samplers"][0]["input"]]
+    bounded = [
+        primitive["attributes"]["POSITION"],
+        document["animations"][0]["samplers"][0]["input"],
+    ]
     bounded += [target["POSITION"] for target in primitive["targets"]]
     assert all({"min", "max"} <= set(document["accessors"][number]) for number in bounded)
 

@@ -13,11 +13,10 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.methods.mesh_export import MeshRequest, carried, export_meshes
 from mocoflow_core.methods.surface_mesh import surface_mesh
-from mocoflow_core.rendering.shell_scene import ShellScene
 from mocoflow_core.rendering.surface_points import surface_points
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from tests.one_thread import one_thread  # noqa: F401
-from tests.toy_training import prepare, silent, train, write_toy
+from tests.toy_training import SAMPLING, prepare, silent, train, write_toy
 
 SPACING_M = 0.03
 
@@ -39,6 +38,10 @@ def toy(tmp_path_factory):
     capture |= {"first_frame": 0, "last_frame": int(clip.frame_indices[-1])}
     said = {"request": "", "scene": "toy", "scene_path": "", "preset": "toy", "store": ""}
     return Toy(RunRecord(**said, seed=0, configuration={}, capture=capture), folder, clip)
+
+
+def canonical_of(scene):
+    return scene.space.canonical(scene.field)
 
 
 def export(toy, out, **request):
@@ -76,7 +79,8 @@ def test_posed_meshes_lie_where_the_camera_sees_the_surface(toy, tmp_path):
         posed = trimesh.load(tmp_path / "plys" / f"{frame:06d}.ply", process=False)
         seen = surface_points(scene, toy.clip.camera, float(time)).points
         _, distance, _ = trimesh.proximity.closest_point(posed, seen)
-        assert np.median(distance) < 0.005, frame
+        # A ray knows its density once in a step.
+        assert np.median(distance) < 0.5 * SAMPLING.step_m, frame
 
 
 def test_an_animation_spans_the_clip_in_seconds(toy, tmp_path):
@@ -102,9 +106,7 @@ def test_the_same_scene_gives_the_same_files(toy, tmp_path):
         ({"format": "ply", "spacing_m": 0.001}, "out", "million points"),
     ],
 )
-def test_what_cannot_be_exported_is_refused_without_a_trace(
-    toy, tmp_path, request_, name, because
-):
+def test_what_cannot_be_exported_is_refused_without_a_trace(toy, tmp_path, request_, name, because):
     with pytest.raises(InputError, match=because):
         export(toy, tmp_path / name, **request_)
     assert not list(tmp_path.iterdir())
@@ -121,19 +123,11 @@ def test_a_place_that_is_taken_is_left_alone(toy, tmp_path, wanted, taken):
 
 def test_points_that_the_motion_does_not_know_go_with_their_neighbours(toy):
     posed = TrainedScene.open(toy.folder).at(1.0)
-    assert isinstance(posed, ShellScene)
-    surface = posed.body.canonical_grid
-    near = surface_mesh(posed_canonical(toy), SPACING_M).vertices[:50]
-    far = near[:1] + [0.0, 0.0, 9.0]
+    near = surface_mesh(canonical_of(TrainedScene.open(toy.folder)), SPACING_M).vertices[:50]
+    far = near[:1] + np.array([0.0, 0.0, 9.0])
     moved = carried(posed, np.concatenate([near, far]))
-    assert surface.count == 1
     last = np.linalg.norm(near - far, axis=1).argmin()
     assert moved[-1] - far[0] == pytest.approx(moved[last] - near[last], abs=1e-5)
-
-
-def posed_canonical(toy):
-    scene = TrainedScene.open(toy.folder)
-    return scene.space.canonical(scene.field)
 
 
 def test_mean_light_is_neither_the_brightest_nor_the_darkest_side(toy):
@@ -144,5 +138,5 @@ def test_mean_light_is_neither_the_brightest_nor_the_darkest_side(toy):
     points = torch.from_numpy(scene.space.canonical_vertices[:20])
     code = scene.field.appearance.mean(0).expand(20, -1)
     top, below = (grid(points, code, torch.tensor([[0.0, 0, s]]).expand(20, 3))[0] for s in (1, -1))
-    lit = scene.space.canonical(scene.field).colour(points, points)
+    lit = canonical_of(scene).colour(points, points)
     assert ((below < lit) & (lit < top)).all()
