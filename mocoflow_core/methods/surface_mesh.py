@@ -19,7 +19,7 @@ from mocoflow_core.rendering.canonical_scene import CanonicalScene
 Points = NDArray[np.float64]
 
 LEAST_AREA_SHARE = 0.01  # of the whole surface; a smaller part floats beside the body
-MOST_LATTICE_POINTS = 50_000_000  # 1.5 GB of memory
+MOST_LATTICE_POINTS = 50_000_000  # bounds the memory
 _COARSE = 2  # lattice points from one of the first look to the next
 _HALVINGS = 6  # of a lattice edge, until its vertex is placed
 _AT_ONCE = 65_536
