@@ -28,7 +28,9 @@ from mocoflow_core.training.snapshots import Snapshot, forget_snapshots, keep_sn
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
-_START_RAYS = 1024  # that tell how large the losses are at the start
+# That tell how large the losses are at the start: of a single frame they may be next to nothing.
+_START_RAYS = 1024
+_START_FRAMES = 16
 
 Score = Callable[[], float]
 
@@ -72,7 +74,13 @@ class TrainingRun:
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
         self.progress = restored.progress if restored else self._first_start()
-        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, self.progress.rays)
+        self.guard = Guard(
+            field,
+            self.optimiser,
+            _ALLOWED_EVENTS,
+            self.progress.rays,
+            schedule.frames_per_step,
+        )
         self.guard.expect(self.progress.best)
         self.guard.events = self.progress.events
         self.guard.rate_scale = self.progress.rate_scale
@@ -162,11 +170,16 @@ class TrainingRun:
 
     @torch.no_grad()
     def _start_loss(self) -> float:
-        """What the losses sum to before anything is learned, over enough rays to rely on."""
+        """What the losses sum to before anything is learned, over enough rays and frames."""
         generator = torch.Generator().manual_seed(0)
-        rays = max(self.schedule.rays, _START_RAYS)
-        batch = self.pixels.batch(rays, self.schedule.frames_per_step, generator)
-        return float(torch.stack(list(self.objective(batch, generator).values())).sum())
+        frames = self.schedule.frames_per_step
+        batches = -(-_START_FRAMES // frames)
+        rays = -(-max(self.schedule.rays, _START_RAYS) // batches)
+        found = 0.0
+        for _ in range(batches):
+            terms = self.objective(self.pixels.batch(rays, frames, generator), generator)
+            found += float(torch.stack(list(terms.values())).sum())
+        return found / batches
 
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
