@@ -12,7 +12,7 @@ from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
 
-# Written out: the presets themselves take torch, which takes a second.
+# Written out: presets and experiments themselves take torch, which takes a second.
 EXPERIMENT_HELP = (
     "removal, progressive, misalignment, partial_observation, train_camera or worse_estimate: "
     "scenes, methods and presets of the paper's, where they are not given."

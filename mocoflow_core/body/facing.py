@@ -43,6 +43,16 @@ def frames_that_show(ingested: Path, scene: Scene, least: float) -> Indices:
     return body.meshes.frame_indices[shares >= least]
 
 
+def turned_away_warning(kept: int, frames: int, least: float) -> tuple[str, ...]:
+    """How many of the clip's frames were not looked at, said where any was not."""
+    if kept == frames:
+        return ()
+    return (
+        f"{frames - kept} of {frames} frames are not looked at: they show less than "
+        f"{100 * least:.0f} % of the side that the first frame shows",
+    )
+
+
 def _facing(
     vertices: NDArray[np.float32], body: IngestedMeshes, camera: Camera
 ) -> NDArray[np.bool_]:

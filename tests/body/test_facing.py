@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocoflow_core.body.facing import frames_that_show, shown_share
+from mocoflow_core.body.facing import frames_that_show, shown_share, turned_away_warning
 from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.capture.scene import open_scene
 from tests.capsule_person import capsule_person, default_recipe, write_scene
@@ -63,3 +63,10 @@ def test_the_frames_that_show_enough_are_named_by_their_numbers(tmp_path):
     scene = open_scene(folder)
     assert frames_that_show(ingested, scene, 0.5).tolist() == [0, 1, 3]
     assert frames_that_show(ingested, scene, 0.0).tolist() == [0, 1, 2, 3]
+
+
+def test_frames_that_are_not_looked_at_are_counted_in_words():
+    assert turned_away_warning(8, 8, 0.5) == ()
+    [sentence] = turned_away_warning(5, 8, 0.5)
+    assert "3 of 8 frames" in sentence
+    assert "50 %" in sentence
