@@ -119,7 +119,7 @@ def test_the_same_scene_may_be_learned_from_two_cameras(compare, toy_scene, tmp_
 def test_an_experiment_says_what_the_user_does_not(tmp_path):
     asked = BenchmarkRequest(experiment="progressive", out=tmp_path / "out")
     assert asked.methods == (*SERIES, "posed_mesh")
-    assert asked.presets == ("paper",)
+    assert asked.presets == ("paper_small",)
     own = BenchmarkRequest(experiment="progressive", out=tmp_path / "out", presets=("paper_aist",))
     assert (own.presets, own.scenes) == (("paper_aist",), asked.scenes)
 
