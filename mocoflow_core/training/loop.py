@@ -192,7 +192,6 @@ class TrainingRun:
 
     def _refuse(self, problem: str) -> None:
         self.guard.refuse(self.progress.step, problem)
-        self.progress.rate_scale = self.guard.rate_scale
 
     def _go_back_if_bad(self) -> None:
         """The last update has not been seen by a step: nothing bad may be kept."""
@@ -227,6 +226,7 @@ class TrainingRun:
             return  # the next step refuses it
         progress, guard = self.progress, self.guard
         progress.best, progress.recent = guard.best, list(guard.recent)
+        progress.rate_scale = guard.rate_scale
         progress.losses = list(self._losses)
         parts = (self.field, self.optimiser, self.generator)
         save_checkpoint(self.workspace, progress, *parts, guard.good_state())
