@@ -39,8 +39,9 @@ from mocoflow_core.presets import Configuration
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
-from mocoflow_core.training.optimise_scene import Learned, OptimisationResult, optimise_scene
+from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene
 from mocoflow_core.training.pretrain_density import pretrain_density
+from mocoflow_core.training.problem import Learned, shell_problem
 from mocoflow_core.training.snapshots import Snapshot, read_snapshots, snapshot_weights
 
 
@@ -61,13 +62,12 @@ class PreparedScene:
         self.spent = clock.read()
         self._views = _views(scene, self.clip, configuration)
         self._evaluation: EvaluationConfig = configuration.evaluation
-        self._opened: TrainedScene | None = None
 
     def train(self, configuration: Configuration, seed: int) -> Trained:
         """Optimise as the plan says and score the result."""
         with TemporaryDirectory() as folder:
             result = self._optimise(configuration, seed, Path(folder))
-            trained = self._open(Path(folder))
+            trained = TrainedScene.open(Path(folder))
         return Trained(result, self._scores(trained))
 
     def curve(self, configuration: Configuration, seed: int, method: str) -> list[CurveRow]:
@@ -82,18 +82,10 @@ class PreparedScene:
             )
 
     def _moment(self, folder: Path, snapshot: Snapshot, method: str) -> Moment:
-        opened = self._open(folder, snapshot_weights(folder, snapshot))
+        opened = TrainedScene.open(folder, snapshot_weights(folder, snapshot))
         seconds = self.spent + Seconds(snapshot.wall_s, snapshot.cpu_s)
         renderer = TrainedRenderer(opened, self.clip)
         return Moment(method, "optimise_scene", snapshot.step, *astuple(seconds), renderer)
-
-    def _open(self, folder: Path, weights: Path | None = None) -> TrainedScene:
-        """A trained scene, sharing the moments that an earlier one has already prepared."""
-        trained = TrainedScene.open(folder, weights)
-        if self._opened is not None:
-            trained.share_bodies(self._opened)
-        self._opened = trained
-        return trained
 
     def _optimise(
         self, configuration: Configuration, seed: int, folder: Path
@@ -116,15 +108,13 @@ class PreparedScene:
             plan.needs("motion_consensus"),
             plan.needs("appearance_codes"),
         )
+        problem = shell_problem(
+            self.density, self.motion, shape, learned, configuration.losses, seed
+        )
         return optimise_scene(
             self.clip,
-            self.density,
-            self.motion,
-            shape,
-            learned,
-            configuration.losses,
-            sampling,
-            configuration.schedule,
+            problem,
+            configuration.schedule.joint(),
             seed,
             self.spent,
             folder,

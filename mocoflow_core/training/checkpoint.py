@@ -38,6 +38,7 @@ class Progress:
     best: float = math.inf  # the guard's: what the losses sum to where they are best
     recent: list[float] = field(default_factory=list)  # the guard's: sums of the last losses
     losses: list[dict[str, float]] = field(default_factory=list)  # of the last steps
+    averaged: int = 0  # steps that the averaged weights have seen
     tries: int = 1
 
     def to_json(self) -> str:
@@ -56,6 +57,7 @@ class Restored(NamedTuple):
 
     progress: Progress
     good: dict[str, Tensor]  # the guard's last good state
+    means: dict[str, Tensor]  # the weights averaged over the last steps
 
 
 def save_checkpoint(
@@ -65,17 +67,20 @@ def save_checkpoint(
     optimiser: torch.optim.Optimizer,
     generator: torch.Generator,
     good: Mapping[str, Tensor],
+    means: Mapping[str, Tensor],
 ) -> None:
     """Write beside, flush, rename: a kill at any moment leaves the old or the new checkpoint.
 
     Args:
         good: the guard's last good state, to which a resumed run may have to go back.
+        means: the weights averaged over the last steps.
     """
     tensors = {f"model.{name}": value for name, value in model.state_dict().items()}
     for index, state in optimiser.state_dict()["state"].items():
         tensors |= {f"optimiser.{index}.{name}": value for name, value in state.items()}
     # Cloned: safetensors refuses tensors that share memory.
     tensors |= {f"good.{name}": value.clone() for name, value in good.items()}
+    tensors |= {f"mean.{name}": value.clone() for name, value in means.items()}
     tensors["generator"] = generator.get_state()
     beside = folder / (_FILE + ".tmp")
     save_file(tensors, beside, metadata={"progress": progress.to_json()})
@@ -100,7 +105,7 @@ def load_checkpoint(
     optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
     generator.set_state(tensors["generator"])
     progress = Progress.from_json(read_metadata(path)["progress"])
-    return Restored(progress, _under("good.", tensors))
+    return Restored(progress, _under("good.", tensors), _under("mean.", tensors))
 
 
 def remove_checkpoint(folder: Path) -> None:

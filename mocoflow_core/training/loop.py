@@ -11,7 +11,8 @@ import torch
 
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
-from mocoflow_core.training.batches import TrainingPixels
+from mocoflow_core.training.averaged_weights import AveragedWeights
+from mocoflow_core.training.batches import PixelSource
 from mocoflow_core.training.checkpoint import (
     Progress,
     Restored,
@@ -28,29 +29,31 @@ from mocoflow_core.training.snapshots import Snapshot, forget_snapshots, keep_sn
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
-_START_RAYS = 1024  # that tell how large the losses are at the start
+# That tell how large the losses are at the start: of a single frame they may be next to nothing.
+_START_RAYS = 1024
+_START_FRAMES = 16
 
-Score = Callable[[SceneField], float]
+Score = Callable[[], float]
 
 
 class TrainingRun:
     """One optimisation, started or resumed.
 
     ``score`` is ``train_psnr`` of the held-out pixels, asked while the clock stands still; each
-    snapshot hands the curve so far to ``watch``.
+    snapshot hands the curve so far to ``watch``. Without a watcher none are kept.
     """
 
     def __init__(
         self,
         field: SceneField,
         objective: Objective,
-        pixels: TrainingPixels,
+        pixels: PixelSource,
         schedule: ScheduleConfig,
         seed: int,
         before: Seconds,
         workspace: Path,
         progress: Callable[[float, str], None],
-        watch: Callable[[list[Snapshot]], None],
+        watch: Callable[[list[Snapshot]], None] | None,
         score: Score | None,
         clock: TrainingClock,
     ) -> None:
@@ -68,11 +71,18 @@ class TrainingRun:
         # Torch loads its compiler with the first optimiser, for seconds: an import, not work.
         with clock.paused():
             self.optimiser = _optimiser(field, schedule)
+        self.average = AveragedWeights(field, schedule.averaging)
         self._base_rates = [group["lr"] for group in self.optimiser.param_groups]
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
         self.progress = restored.progress if restored else self._first_start()
-        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, self.progress.rays)
+        self.guard = Guard(
+            field,
+            self.optimiser,
+            _ALLOWED_EVENTS,
+            self.progress.rays,
+            schedule.frames_per_step,
+        )
         self.guard.expect(self.progress.best)
         self.guard.events = self.progress.events
         self.guard.rate_scale = self.progress.rate_scale
@@ -90,6 +100,7 @@ class TrainingRun:
         progress.elapsed = self.clock.read()
         self._losses.extend(progress.losses)
         self.guard.restore(restored.good, progress.best, progress.recent)
+        self.average.restore(restored.means, progress.averaged)
 
     def run(self) -> None:
         """All remaining steps."""
@@ -143,6 +154,7 @@ class TrainingRun:
                 self.report(self.pace.share(progress.step, progress.elapsed.wall), self._text())
         self._go_back_if_bad()
         self._snapshot()
+        self.average.take()
 
     def _is_over(self, step_s: float) -> bool:
         progress = self.progress
@@ -162,17 +174,22 @@ class TrainingRun:
 
     @torch.no_grad()
     def _start_loss(self) -> float:
-        """What the losses sum to before anything is learned, over enough rays to rely on."""
+        """What the losses sum to before anything is learned, over enough rays and frames."""
         generator = torch.Generator().manual_seed(0)
-        rays = max(self.schedule.rays, _START_RAYS)
-        batch = self.pixels.batch(rays, self.schedule.frames_per_step, generator)
-        return float(torch.stack(list(self.objective(batch, generator).values())).sum())
+        frames = self.schedule.frames_per_step
+        batches = -(-_START_FRAMES // frames)
+        rays = -(-max(self.schedule.rays, _START_RAYS) // batches)
+        found = 0.0
+        for _ in range(batches):
+            terms = self.objective(self.pixels.batch(rays, frames, generator), generator)
+            found += float(torch.stack(list(terms.values())).sum())
+        return found / batches
 
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
         schedule, step = self.schedule, self.progress.step
-        bands = self.field.motion.residual_to_canonical.encoding.bands
-        self.field.anneal(band_alpha(share, schedule.coarse_share, bands))
+        limits = (schedule.first_bands, schedule.last_bands)
+        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands, *limits))
         factor = rate_factor(share, schedule.final_rate) * self.guard.rate_scale
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
@@ -188,10 +205,12 @@ class TrainingRun:
             self._refuse(problem)
             return
         self.optimiser.step()
+        self.average.update()
         self._losses.append({name: float(value.detach()) for name, value in terms.items()})
 
     def _refuse(self, problem: str) -> None:
         self.guard.refuse(self.progress.step, problem)
+        self.average.restart()
 
     def _go_back_if_bad(self) -> None:
         """The last update has not been seen by a step: nothing bad may be kept."""
@@ -209,17 +228,17 @@ class TrainingRun:
             self._snapshot()
 
     def _snapshot(self) -> None:
-        if self.guard.problem({}) is not None:
-            return  # the next step refuses it
+        if self.watch is None or self.guard.problem({}) is not None:
+            return  # a bad state is refused by the next step
         self.progress.snapshot_s = self.progress.elapsed.wall
         psnr = self._train_psnr()
-        with self.clock.paused():
+        with self.clock.paused(), self.average.shown():
             now = self.progress.elapsed
             self.watch(keep_snapshot(self.workspace, self.field, self.progress.step, now, psnr))
 
     def _train_psnr(self) -> float | None:
-        with self.clock.paused():
-            return None if self.score is None else self.score(self.field)
+        with self.clock.paused(), self.average.shown():
+            return None if self.score is None else self.score()
 
     def _save(self) -> None:
         if self.guard.problem({}) is not None:
@@ -228,17 +247,17 @@ class TrainingRun:
         progress.best, progress.recent = guard.best, list(guard.recent)
         progress.rate_scale = guard.rate_scale
         progress.losses = list(self._losses)
+        progress.averaged = self.average.steps
         parts = (self.field, self.optimiser, self.generator)
-        save_checkpoint(self.workspace, progress, *parts, guard.good_state())
+        states = (guard.good_state(), self.average.state())
+        save_checkpoint(self.workspace, progress, *parts, *states)
 
 
 def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:
-    features = list(field.canonical.tables)
-    networks = [p for n, p in field.canonical.named_parameters() if not n.startswith("tables.")]
-    motion = [*field.motion.parameters(), field.appearance]
+    rates = (schedule.rate_features, schedule.rate_networks, schedule.rate_motion)
     groups = [
-        {"params": features, "lr": schedule.rate_features},
-        {"params": networks, "lr": schedule.rate_networks},
-        {"params": motion, "lr": schedule.rate_motion},
+        {"params": parameters, "lr": rate}
+        for parameters, rate in zip(field.rate_groups(), rates, strict=True)
     ]
-    return torch.optim.Adam(groups, betas=(0.9, 0.99), eps=1e-10, fused=True)
+    betas = (0.9, schedule.adam_beta2)
+    return torch.optim.Adam(groups, betas=betas, eps=schedule.adam_epsilon, fused=True)

@@ -7,35 +7,18 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import torch
 from safetensors.torch import save_file
 
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
-from mocoflow_core.fields.canonical_density import CanonicalDensity
-from mocoflow_core.fields.motion_hybrid import Moments
-from mocoflow_core.fields.scene_field import SceneField
-from mocoflow_core.fields.scene_shape import SceneShape
-from mocoflow_core.losses.weights import LossConfig
-from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.checkpoint import Progress
 from mocoflow_core.training.clock import Seconds, TrainingClock
-from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.held_out import HeldOutPixels, HeldOutScore, draw_held_out
 from mocoflow_core.training.loop import TrainingRun
-from mocoflow_core.training.objective import Objective
+from mocoflow_core.training.problem import Problem
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot, read_snapshots
-
-
-@dataclass(frozen=True)
-class Learned:
-    """Which parts of the field this scene needs; the plan decides."""
-
-    motion_residual: bool = True
-    consensus: bool = True
-    appearance_codes: bool = True
 
 
 @dataclass(frozen=True)
@@ -61,12 +44,7 @@ def unwatched(curve: list[Snapshot]) -> None:
 
 def optimise_scene(
     clip: Clip,
-    density: CanonicalDensity,
-    motion: MotionStart,
-    shape: SceneShape,
-    learned: Learned,
-    losses: LossConfig,
-    sampling: SamplingConfig,
+    problem: Problem,
     schedule: ScheduleConfig,
     seed: int,
     before: Seconds,
@@ -77,10 +55,11 @@ def optimise_scene(
 ) -> OptimisationResult:
     """Train the fields of a scene; resume from the workspace's checkpoint if there is one.
 
-    Writes the trained scene (``model.safetensors``, ``shape.json``, the density and the controls),
+    Writes the trained scene (``model.safetensors`` and what else is needed to open it),
     ``snapshots/%06d.safetensors`` at geometric times with ``snapshots.json``, and ``result.json``.
 
     Args:
+        problem: what is learned and from what; its field is trained in place.
         before: training clock of the stages so far.
         workspace: folder that survives a kill.
         watch: is given all snapshots so far whenever there is a new one.
@@ -93,27 +72,18 @@ def optimise_scene(
     Source: MoCo-Flow sec. 3.4, third stage.
     """
     clock = clock or TrainingClock()
-    torch.manual_seed(seed)
-    field = shape.build(density.prior())
-    _freeze_what_is_not_needed(field, learned)
-    body = motion.body
-    moments = Moments(body, field.motion.codes)
-    weights = losses if learned.consensus else losses.model_copy(update={"consensus_weight": 0.0})
-    objective = Objective(
-        field, moments, weights, sampling, shape.shell_width_m, learned.motion_residual
-    )
     with clock.paused():
         held_out = draw_held_out(clip, schedule.held_out_pixels)
         _require_pixels_to_score(held_out, schedule)
         score = None
         if held_out is not None:
-            score = HeldOutScore.prepare(clip, held_out, motion, shape, field, sampling)
-    pixels = TrainingPixels(clip, body, shape.shell_width_m, held_out)
+            score = HeldOutScore.prepare(clip, held_out, problem.space, problem.field)
+    pixels = TrainingPixels(clip, problem.scene, held_out)
     workspace.mkdir(parents=True, exist_ok=True)
-    write_scene_parts(workspace, shape, density, motion)
+    problem.space.save(workspace)
     run = TrainingRun(
-        field,
-        objective,
+        problem.field,
+        problem.objective,
         pixels,
         schedule,
         seed,
@@ -125,25 +95,11 @@ def optimise_scene(
         clock,
     )
     run.run()
-    save_file(field.state_dict(), workspace / "model.safetensors")
+    save_file(problem.field.state_dict(), workspace / "model.safetensors")
     result = _result(run, before, held_out)
     (workspace / "result.json").write_text(json.dumps(asdict(result)))
     run.forget_checkpoint()
     return result
-
-
-def write_scene_parts(
-    folder: Path, shape: SceneShape, density: CanonicalDensity, motion: MotionStart
-) -> None:
-    """Everything besides the weights that a trained scene needs to be opened alone."""
-    (folder / "shape.json").write_text(shape.model_dump_json(indent=1))
-    density.save(folder)
-    motion.controls.save(folder)
-
-
-def _freeze_what_is_not_needed(field: SceneField, learned: Learned) -> None:
-    field.motion.requires_grad_(learned.motion_residual)
-    field.appearance.requires_grad_(learned.appearance_codes)
 
 
 def _require_pixels_to_score(held_out: HeldOutPixels | None, schedule: ScheduleConfig) -> None:
