@@ -32,7 +32,7 @@ _SMALL_LOSS = 1e-3
 # from a single frame. Losses that have risen say that the rates are too high, and mostly by far:
 # too low ones leave the start as it is, too high ones end in something worse.
 _CUT = 0.5
-_CUT_AFTER_RISE = 0.25
+_CUT_AFTER_RISE = 0.125
 
 
 class TrainingDiverged(RuntimeError):
