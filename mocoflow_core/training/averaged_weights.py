@@ -29,8 +29,10 @@ class AveragedWeights:
 
     @torch.no_grad()
     def update(self) -> None:
-        """Take in the weights after a step. Early means are short, lest the start stays in them."""
+        """Take in the weights after a step. Early means are short: the start is no part of them."""
         self.steps += 1
+        if self.steps == 1:
+            self.restart()
         kept = min(self.decay, self.steps / (self.steps + 9.0))
         for mean, value in zip(self._means, self._learned.values(), strict=True):
             mean.lerp_(value, 1.0 - kept)

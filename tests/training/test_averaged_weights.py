@@ -50,6 +50,14 @@ def test_without_averaging_the_last_weights_are_shown_bit_for_bit():
     assert average.state() == {}
 
 
+def test_the_mean_has_the_precision_of_the_weights_that_are_trained():
+    learned = model(1.0)
+    average = AveragedWeights(learned, 0.97)
+    learned.double()
+    walk(learned, average, [2.0, 3.0])
+    assert average.state()["weight"].dtype == torch.float64
+
+
 def test_frozen_weights_have_no_mean():
     learned = model(1.0)
     learned.bias.requires_grad_(False)
