@@ -14,13 +14,15 @@ from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.geometry.rays import Rays, pixel_rays
 from mocoflow_core.rendering.pixels import shell_pixels
 from mocoflow_core.training.held_out import HeldOutPixels
+from mocoflow_core.training.ranks import ALONE, Ranks
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """R rays with what the camera saw along them."""
+    """R rays with what the camera saw along them; this rank's part of a step."""
 
     rays: Rays
+    rays_in_all: int  # of the step, on all ranks
     row: Tensor  # (R,) training frame of each ray
     near: Tensor  # (R,) metres along the ray between which the shell lies
     far: Tensor  # (R,)
@@ -45,9 +47,11 @@ class TrainingPixels:
         body: BodyMotion,
         shell_width_m: float,
         held_out: HeldOutPixels | None = None,
+        ranks: Ranks = ALONE,
     ) -> None:
         rows = np.flatnonzero(~clip.held_out)
         self.camera = clip.camera
+        self.ranks = ranks
         pixels = clip.camera.width * clip.camera.height
         self.frames = torch.from_numpy(clip.frames[rows].reshape(len(rows), pixels, 3))
         self.masks = torch.from_numpy(clip.masks[rows].reshape(len(rows), pixels))
@@ -83,16 +87,23 @@ class TrainingPixels:
         return f"frame {frame} has colours or rays that are not finite"
 
     def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
-        """Rays of a few frames, uniform over frames and over each frame's candidate pixels."""
+        """Rays of a few frames, uniform over frames and over each frame's candidate pixels.
+
+        All are drawn, and those of this rank are given.
+        """
         draws = torch.randint(len(self.in_sight), (frames,), generator=generator)
         chosen = self.in_sight[draws]
         row = chosen.repeat_interleave(-(-rays // frames))[:rays]
         place = torch.rand(rays, generator=generator, dtype=torch.float64)
+        jitter = torch.rand(rays, generator=generator)
+        mine = self.ranks.part(rays)
+        row, place = row[mine], place[mine]
         found = self.starts[row] + (place * self.counts[row]).long()
         pixel = self.candidates[found]
         through, along = pixel_rays(self.camera, pixel)
         return Batch(
             through,
+            rays,
             row,
             self.nearest[found] * along,
             self.farthest[found] * along,
@@ -100,5 +111,5 @@ class TrainingPixels:
             self.masks[row, pixel].float(),
             self.has_mask[row].float(),
             self.background[pixel].float() / 255.0,
-            torch.rand(rays, generator=generator),
+            jitter[mine],
         )

@@ -1,0 +1,144 @@
+"""The processes that share one optimisation: which rays are whose, and what all see together.
+
+Every rank draws the whole batch with the same generator and renders its own rays of it, so that
+what is drawn does not depend on how many there are. Losses are parts of joint means, gradients are
+sums over ranks, and whatever is decided is decided on joint values or by the first rank.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numpy as np
+import torch
+import torch.distributed as process_group
+from pydantic import JsonValue
+from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
+
+from mocoflow_core.training.clock import Seconds
+
+Value = TypeVar("Value", bound=JsonValue)
+
+
+class FirstRankFailed(RuntimeError):
+    """The first rank could not do what the others were waiting for; it says why itself."""
+
+
+class Ranks:
+    """One process alone: its part is the whole, and it agrees with itself."""
+
+    rank = 0
+    count = 1
+
+    @property
+    def is_first(self) -> bool:
+        return self.rank == 0
+
+    def part(self, whole: int) -> slice:
+        """Which of so many rays are this rank's: all of them once, in order, evenly."""
+        return slice(self.rank * whole // self.count, (self.rank + 1) * whole // self.count)
+
+    def wrap(self, objective: nn.Module) -> nn.Module:
+        """The objective with gradients that are means over ranks, of equal starting weights."""
+        return objective
+
+    def total(self, own: Tensor) -> Tensor:
+        """Sum over ranks, the same to the last bit on all of them; carries no gradient."""
+        return own
+
+    def before(self, own: int) -> tuple[int, int]:
+        """How many things the earlier ranks have, and how many there are in all."""
+        return 0, own
+
+    def seconds(self, own: Seconds) -> Seconds:
+        """Wall seconds of the first rank and CPU seconds of all."""
+        return own
+
+    def said(self, words: str | None) -> str | None:
+        """What the first rank that has something to say says."""
+        return words
+
+    def first(self, work: Callable[[], Value]) -> Value:
+        """Let the first rank do something and tell all what came of it; the others wait.
+
+        Raises FirstRankFailed on the others when it raises anything.
+        """
+        return work()
+
+    def first_bytes(self, work: Callable[[], bytes]) -> bytes:
+        """The same for bytes."""
+        return work()
+
+
+ALONE = Ranks()
+
+
+class SeveralRanks(Ranks):
+    """One process of torch's default process group, which must exist already.
+
+    Decisions travel as CPU tensors, gradients on the device that the weights lie on.
+    """
+
+    def __init__(self) -> None:
+        self.rank = process_group.get_rank()
+        self.count = process_group.get_world_size()
+
+    def wrap(self, objective: nn.Module) -> nn.Module:
+        # A rank whose rays meet no sample uses none of some networks.
+        return DistributedDataParallel(
+            objective, broadcast_buffers=False, find_unused_parameters=True
+        )
+
+    def total(self, own: Tensor) -> Tensor:
+        summed = own.detach().clone()
+        process_group.all_reduce(summed)
+        return summed
+
+    def before(self, own: int) -> tuple[int, int]:
+        counts = torch.zeros(self.count, dtype=torch.int64)
+        counts[self.rank] = own
+        process_group.all_reduce(counts)
+        return int(counts[: self.rank].sum()), int(counts.sum())
+
+    def seconds(self, own: Seconds) -> Seconds:
+        joint = torch.tensor([own.wall if self.is_first else 0.0, own.cpu], dtype=torch.float64)
+        process_group.all_reduce(joint)
+        return Seconds(*joint.tolist())
+
+    def said(self, words: str | None) -> str | None:
+        speaker = torch.tensor(self.count if words is None else self.rank)
+        process_group.all_reduce(speaker, process_group.ReduceOp.MIN)
+        if int(speaker) == self.count:
+            return None
+        return _broadcast((words or "").encode(), int(speaker)).decode()
+
+    def first(self, work: Callable[[], Value]) -> Value:
+        said = self.first_bytes(lambda: json.dumps(work()).encode())
+        return cast(Value, json.loads(said))
+
+    def first_bytes(self, work: Callable[[], bytes]) -> bytes:
+        done = b""
+        if self.is_first:
+            try:
+                done = b"+" + work()
+            except BaseException:
+                _broadcast(b"-", 0)
+                raise
+        done = _broadcast(done, 0)
+        if not done.startswith(b"+"):
+            raise FirstRankFailed("the first rank failed; its own words say why")
+        return done[1:]
+
+
+def _broadcast(content: bytes, source: int) -> bytes:
+    """The content that one rank has, on all."""
+    length = torch.tensor(len(content))
+    process_group.broadcast(length, source)
+    carried = torch.zeros(int(length), dtype=torch.uint8)
+    if process_group.get_rank() == source:
+        carried.numpy()[:] = np.frombuffer(content, np.uint8)
+    process_group.broadcast(carried, source)
+    return carried.numpy().tobytes()
