@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import torch
+from pydantic import JsonValue
 from safetensors.torch import save_file
 
 from mocoflow_core.capture.clip import Clip
@@ -25,8 +26,11 @@ from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.held_out import HeldOutPixels, HeldOutScore, draw_held_out
 from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.objective import Objective
+from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot, read_snapshots
+
+RESULT = "result.json"
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,11 @@ class OptimisationResult:
     held_out: str  # what these are
     warnings: tuple[str, ...]
 
+    @classmethod
+    def from_json(cls, text: str) -> OptimisationResult:
+        values = json.loads(text)
+        return cls(**{**values, "warnings": tuple(values["warnings"])})
+
 
 def unwatched(curve: list[Snapshot]) -> None:
     """Nobody looks at the curve while it grows."""
@@ -74,6 +83,7 @@ def optimise_scene(
     progress: Callable[[float, str], None],
     watch: Callable[[list[Snapshot]], None] = unwatched,
     clock: TrainingClock | None = None,
+    ranks: Ranks = ALONE,
 ) -> OptimisationResult:
     """Train the fields of a scene; resume from the workspace's checkpoint if there is one.
 
@@ -85,9 +95,12 @@ def optimise_scene(
         workspace: folder that survives a kill.
         watch: is given all snapshots so far whenever there is a new one.
         clock: of this stage; it must have been started just now.
+        ranks: the processes that share the rays of each step. Each calls this with the same
+            arguments and gets the same result; the first alone writes, reports and is watched.
 
     Raises:
         InputError: a train_psnr to reach, on a scene without any mask to measure it on.
+            A checkpoint that was made with other settings.
         TrainingDiverged: after too many non-finite steps.
 
     Source: MoCo-Flow sec. 3.4, third stage.
@@ -100,17 +113,16 @@ def optimise_scene(
     moments = Moments(body, field.motion.codes)
     weights = losses if learned.consensus else losses.model_copy(update={"consensus_weight": 0.0})
     objective = Objective(
-        field, moments, weights, sampling, shape.shell_width_m, learned.motion_residual
+        field, moments, weights, sampling, shape.shell_width_m, learned.motion_residual, ranks
     )
     with clock.paused():
         held_out = draw_held_out(clip, schedule.held_out_pixels)
         _require_pixels_to_score(held_out, schedule)
         score = None
-        if held_out is not None:
+        if held_out is not None and ranks.is_first:
             score = HeldOutScore.prepare(clip, held_out, motion, shape, field, sampling)
-    pixels = TrainingPixels(clip, body, shape.shell_width_m, held_out)
-    workspace.mkdir(parents=True, exist_ok=True)
-    write_scene_parts(workspace, shape, density, motion)
+    pixels = TrainingPixels(clip, body, shape.shell_width_m, held_out, ranks)
+    ranks.first(lambda: write_scene_parts(workspace, shape, density, motion))
     run = TrainingRun(
         field,
         objective,
@@ -123,22 +135,49 @@ def optimise_scene(
         watch,
         score,
         clock,
+        ranks,
+        _settings(shape, learned, losses, sampling, schedule, seed),
     )
     run.run()
-    save_file(field.state_dict(), workspace / "model.safetensors")
-    result = _result(run, before, held_out)
-    (workspace / "result.json").write_text(json.dumps(asdict(result)))
-    run.forget_checkpoint()
-    return result
+    return OptimisationResult.from_json(ranks.first(lambda: _finish(run, before, held_out)))
 
 
 def write_scene_parts(
     folder: Path, shape: SceneShape, density: CanonicalDensity, motion: MotionStart
 ) -> None:
     """Everything besides the weights that a trained scene needs to be opened alone."""
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / "shape.json").write_text(shape.model_dump_json(indent=1))
     density.save(folder)
     motion.controls.save(folder)
+
+
+def _settings(
+    shape: SceneShape,
+    learned: Learned,
+    losses: LossConfig,
+    sampling: SamplingConfig,
+    schedule: ScheduleConfig,
+    seed: int,
+) -> dict[str, JsonValue]:
+    """What decides where a run ends, and so whether it may go on from a checkpoint."""
+    return {
+        "shape": shape.model_dump(mode="json"),
+        "learned": asdict(learned),
+        "losses": losses.model_dump(mode="json"),
+        "sampling": sampling.model_dump(mode="json"),
+        "schedule": schedule.model_dump(mode="json", exclude={"threads", "checkpoint_every_s"}),
+        "seed": seed,
+    }
+
+
+def _finish(run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None) -> str:
+    """Write the trained weights and the result, and drop the checkpoint."""
+    save_file(run.field.state_dict(), run.workspace / "model.safetensors")
+    result = json.dumps(asdict(_result(run, before, held_out)))
+    (run.workspace / RESULT).write_text(result)
+    run.forget_checkpoint()
+    return result
 
 
 def _freeze_what_is_not_needed(field: SceneField, learned: Learned) -> None:
