@@ -30,6 +30,7 @@ from mocoflow_core.training.optimise_scene import (
     unwatched,
 )
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
+from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot
 
@@ -94,6 +95,7 @@ def train(
     before: Seconds | None = None,
     watch: Callable[[list[Snapshot]], None] = unwatched,
     clock: TrainingClock | None = None,
+    ranks: Ranks = ALONE,
 ) -> OptimisationResult:
     return optimise_scene(
         prepared.clip,
@@ -110,6 +112,7 @@ def train(
         progress,
         watch,
         clock,
+        ranks,
     )
 
 

@@ -4,11 +4,17 @@ import pytest
 
 from tests.one_thread import one_thread  # noqa: F401
 from tests.toy_training import prepare, train, write_toy
+from tests.two_ranks import TwoRanks
 
 
 @pytest.fixture(scope="session")
-def prepared(tmp_path_factory):
-    return prepare(write_toy(tmp_path_factory.mktemp("scene") / "toy"))
+def toy_folder(tmp_path_factory):
+    return write_toy(tmp_path_factory.mktemp("scene") / "toy")
+
+
+@pytest.fixture(scope="session")
+def prepared(toy_folder):
+    return prepare(toy_folder)
 
 
 @pytest.fixture(scope="session")
@@ -17,3 +23,10 @@ def trained(prepared, tmp_path_factory):
     folder = tmp_path_factory.mktemp("trained")
     train(prepared, folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def two_ranks():
+    ranks = TwoRanks()
+    yield ranks
+    ranks.close()
