@@ -31,8 +31,9 @@ from mocoflow_core.presets import Configuration
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
-from mocoflow_core.training.optimise_scene import Learned, OptimisationResult, optimise_scene
+from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene
 from mocoflow_core.training.pretrain_density import pretrain_density
+from mocoflow_core.training.problem import Learned, shell_problem
 
 
 class Trained(NamedTuple):
@@ -51,16 +52,12 @@ class PreparedScene:
         self.spent = clock.read()
         self._views = _views(scene, self.clip, configuration)
         self._evaluation: EvaluationConfig = configuration.evaluation
-        self._opened: TrainedScene | None = None
 
     def train(self, configuration: Configuration, seed: int) -> Trained:
         """Optimise as the plan says and score the result."""
         with TemporaryDirectory() as folder:
             result = self._optimise(configuration, seed, Path(folder))
             trained = TrainedScene.open(Path(folder))
-        if self._opened is not None:
-            trained.share_bodies(self._opened)
-        self._opened = trained
         return Trained(result, self._scores(trained))
 
     def _optimise(
@@ -84,14 +81,12 @@ class PreparedScene:
             plan.needs("motion_consensus"),
             plan.needs("appearance_codes"),
         )
+        problem = shell_problem(
+            self.density, self.motion, shape, learned, configuration.losses, seed
+        )
         return optimise_scene(
             self.clip,
-            self.density,
-            self.motion,
-            shape,
-            learned,
-            configuration.losses,
-            sampling,
+            problem,
             configuration.schedule,
             seed,
             self.spent,

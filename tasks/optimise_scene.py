@@ -19,7 +19,7 @@ from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training import optimise_scene as training
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart
-from mocoflow_core.training.optimise_scene import Learned
+from mocoflow_core.training.problem import Learned, shell_problem
 from mocoflow_core.training.schedule import ScheduleConfig
 from tasks.growing_curve import GrowingCurve
 from tasks.stage import Aside, Stage, Summary, stage
@@ -52,8 +52,7 @@ def optimise_scene(
     canonical = canonical.model_copy(update={"finest_m": decided.no_finer(canonical.finest_m)})
     sampling = sampling.model_copy(update={"step_m": decided.no_finer(sampling.step_m)})
     spent = Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
-    result = training.optimise_scene(
-        seen,
+    problem = shell_problem(
         CanonicalDensity.load(work.open(density)),
         MotionStart.load(work.open(motion)),
         SceneShape(
@@ -72,7 +71,11 @@ def optimise_scene(
             appearance_codes=decided.needs("appearance_codes"),
         ),
         losses,
-        sampling,
+        seed,
+    )
+    result = training.optimise_scene(
+        seen,
+        problem,
         schedule,
         seed,
         spent,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +16,19 @@ from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
+from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.motion_residual import ResidualConfig
-from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.rendering.shell_scene import ShellScene
+from mocoflow_core.rendering.shell_space import ShellSpace
 from mocoflow_core.synthetic.toy import ToyConfig, write_toy_scene
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
-from mocoflow_core.training.optimise_scene import (
-    Learned,
-    OptimisationResult,
-    optimise_scene,
-    unwatched,
-)
+from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene, unwatched
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
+from mocoflow_core.training.problem import Learned, shell_problem
 from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot
@@ -57,9 +56,17 @@ class Prepared:
     motion: MotionStart
     shape: SceneShape
 
-    def field(self, seed: int = 0) -> SceneField:
+    @cached_property
+    def space(self) -> ShellSpace:
+        return ShellSpace(self.shape, self.density, self.motion.controls)
+
+    def field(self, seed: int = 0) -> HybridField:
         torch.manual_seed(seed)
-        return self.shape.build(self.density.prior())
+        return self.space.build()
+
+    def scene(self, field: HybridField | None = None) -> ShellScene:
+        """At the training frames."""
+        return self.space.at_training_frames(field or self.field(), self.motion.body)
 
 
 def write_toy(folder: Path) -> Path:
@@ -97,14 +104,18 @@ def train(
     clock: TrainingClock | None = None,
     ranks: Ranks = ALONE,
 ) -> OptimisationResult:
-    return optimise_scene(
-        prepared.clip,
+    problem = shell_problem(
         prepared.density,
         prepared.motion,
         prepared.shape,
         learned or Learned(),
         losses or LossConfig(consensus_points=32),
-        SAMPLING,
+        seed,
+        ranks,
+    )
+    return optimise_scene(
+        prepared.clip,
+        problem,
         schedule,
         seed,
         before or Seconds(),
@@ -112,7 +123,6 @@ def train(
         progress,
         watch,
         clock,
-        ranks,
     )
 
 

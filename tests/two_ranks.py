@@ -37,7 +37,7 @@ class TwoRanks:
         ]
 
     def __call__(self, function: Callable[..., Any], *args: object) -> list[Any]:
-        """What both give back, by rank; their exceptions are raised here, the first rank's first."""
+        """What both give back, by rank; an exception is raised here."""
         waiting = [pool.submit(function, *args) for pool in self._pools]
         return [ended.result() for ended in waiting]
 

@@ -79,6 +79,16 @@ class RigidControls:
         )
         return self._one_frame(clamped, observed, rotations)
 
+    def at_times(self, times: NDArray[np.float64]) -> RigidControls:
+        """The controls at several moments, each as ``at_time`` gives it."""
+        moments = [self.at_time(float(time)) for time in times]
+        return replace(
+            self,
+            times=np.concatenate([moment.times for moment in moments]),
+            observed=np.concatenate([moment.observed for moment in moments]),
+            rotations=np.concatenate([moment.rotations for moment in moments]),
+        )
+
     def _one_frame(self, time: float, observed: Array, rotations: Array) -> RigidControls:
         return replace(
             self, times=np.array([time]), observed=observed[None], rotations=rotations[None]

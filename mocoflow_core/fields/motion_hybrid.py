@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.motion_residual import ResidualConfig, ResidualMotion
+from mocoflow_core.fields.scene_field import interpolate_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +65,3 @@ class HybridMotion(nn.Module):
         if self.corrects:
             points = self.residual_to_observed(points, moments.codes[row])
         return moments.body.to_observed(points, row)
-
-
-def interpolate_rows(values: Tensor, at: Tensor, times: Tensor) -> Tensor:
-    """Rows (F, C) given at ascending times (F,), linearly interpolated at times (G,), (G, C)."""
-    if len(at) == 1:
-        return values.expand(len(times), -1)
-    times = times.double().clamp(at[0], at[-1])
-    after = torch.searchsorted(at, times).clamp(1, len(at) - 1)
-    share = ((times - at[after - 1]) / (at[after] - at[after - 1])).to(values.dtype)[:, None]
-    return (1.0 - share) * values[after - 1] + share * values[after]

@@ -1,40 +1,61 @@
-"""All that is learned about one scene: motion, canonical field and appearance codes."""
+"""What every representation of a scene shares: appearance codes, annealing, groups of rates."""
 
 from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from mocoflow_core.fields.canonical_grid import CanonicalGrid
-from mocoflow_core.fields.motion_hybrid import HybridMotion, Moments, interpolate_rows
+
+class RateGroups(NamedTuple):
+    """Parameters by the rate at which they learn."""
+
+    features: list[nn.Parameter]
+    networks: list[nn.Parameter]
+    motion: list[nn.Parameter]
 
 
-class SceneField(nn.Module):
-    """The fields of one scene; the paper's networks will stand behind the same methods."""
+class SceneField(nn.Module, ABC):
+    """All that is learned about one scene: motion, canonical field and appearance codes."""
 
-    def __init__(self, motion: HybridMotion, canonical: CanonicalGrid) -> None:
+    times: Tensor
+
+    def __init__(self, times: Tensor, appearance_width: int) -> None:
+        """Args: times (F,) of the training frames, normalised, ascending."""
         super().__init__()
-        self.motion = motion
-        self.canonical = canonical
-        width = canonical.configuration.appearance_width
-        self.appearance = nn.Parameter(torch.zeros(len(motion.times), width))
-
-    def anneal(self, band_alpha: float) -> None:
-        """Set the coarse-to-fine state of every encoding."""
-        self.motion.anneal(band_alpha)
+        self.register_buffer("times", times.double(), persistent=False)
+        self.appearance = nn.Parameter(torch.zeros(len(times), appearance_width))
 
     def appearance_at(self, times: Tensor) -> Tensor:
         """Appearance codes (G, A) at any times (G,), linear between training frames."""
-        return interpolate_rows(self.appearance, self.motion.times, times)
+        return interpolate_rows(self.appearance, self.times, times)
 
-    def at_samples(
-        self,
-        body_canonical: Tensor,
-        facing: Tensor,
-        row: Tensor,
-        moments: Moments,
-        appearance: Tensor,
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Colour (P, 3), density (P,) and surface offset (P,) of samples mapped by the body."""
-        canonical = self.motion.correct(body_canonical, row, moments)
-        return self.canonical(canonical, appearance[row], facing)
+    @property
+    @abstractmethod
+    def bands(self) -> int:
+        """How many annealed frequency bands there are."""
+
+    @abstractmethod
+    def anneal(self, band_alpha: float) -> None:
+        """Set the coarse-to-fine state of every encoding of a position."""
+
+    @abstractmethod
+    def motion_parameters(self) -> Iterator[nn.Parameter]:
+        """Parameters of the motion alone, without appearance codes."""
+
+    @abstractmethod
+    def rate_groups(self) -> RateGroups:
+        """All parameters, each in one group."""
+
+
+def interpolate_rows(values: Tensor, at: Tensor, times: Tensor) -> Tensor:
+    """Rows (F, C) given at ascending times (F,), linearly interpolated at times (G,), (G, C)."""
+    if len(at) == 1:
+        return values.expand(len(times), -1)
+    times = times.double().clamp(at[0], at[-1])
+    after = torch.searchsorted(at, times).clamp(1, len(at) - 1)
+    share = ((times - at[after - 1]) / (at[after] - at[after - 1])).to(values.dtype)[:, None]
+    return (1.0 - share) * values[after - 1] + share * values[after]

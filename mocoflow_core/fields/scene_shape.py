@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import torch
 from pydantic import Field
 from torch import Tensor
@@ -9,10 +11,10 @@ from torch import Tensor
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_grid import CanonicalConfig, CanonicalGrid, nested_grids
+from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.lighting import FixedLight
 from mocoflow_core.fields.motion_hybrid import HybridMotion
 from mocoflow_core.fields.motion_residual import ResidualConfig
-from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
 
 
@@ -26,6 +28,7 @@ class MotionConfig(ConfigurationPart):
 class SceneShape(ConfigurationPart):
     """Everything besides the weights that is needed to build a scene's fields again."""
 
+    representation: Literal["hybrid"] = "hybrid"
     canonical: CanonicalConfig
     motion: MotionConfig
     times: tuple[float, ...] = Field(description="training frames, normalised")
@@ -37,17 +40,16 @@ class SceneShape(ConfigurationPart):
         (0.0, 0.0, 0.0), description="linear brightness is 1 + light . normal, world space"
     )
 
-    def build(self, prior: SignedDistancePrior) -> SceneField:
+    def build(self, prior: SignedDistancePrior) -> HybridField:
         """Fields with fresh weights, drawn from torch's global generator."""
         outside = self.shell_width_m + self.canonical.margin_m
         grids = nested_grids(prior, outside, self.inner_depth_m, self.canonical)
         centre, radius = _middle(prior)
-        motion = HybridMotion(
-            torch.tensor(self.times, dtype=torch.float64), centre, radius, self.motion.residual
-        )
+        times = torch.tensor(self.times, dtype=torch.float64)
+        motion = HybridMotion(times, centre, radius, self.motion.residual)
         motion.corrects = self.residual
         light = FixedLight(self.light)
-        return SceneField(motion, CanonicalGrid(prior, grids, self.canonical, light))
+        return HybridField(times, motion, CanonicalGrid(prior, grids, self.canonical, light))
 
 
 def _middle(prior: SignedDistancePrior) -> tuple[Tensor, float]:

@@ -19,7 +19,7 @@ from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.io.video import write_video
-from mocoflow_core.methods.presentation import body_centre, orbit
+from mocoflow_core.methods.presentation import orbit
 from mocoflow_core.methods.rendered_views import Progress
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.threads import torch_threads
@@ -109,7 +109,7 @@ def _shots(run: RunRecord, scene: TrainedScene, request: ViewRequest) -> list[Sh
         # Turning the person is moving the camera the other way round the person.
         turn = -np.array(request.rotate)
         cameras = [
-            moved_around(camera, turn, body_centre(scene, time))
+            moved_around(camera, turn, scene.space.centre_at(time))
             for camera, time in zip(cameras, times, strict=True)
         ]
     return [

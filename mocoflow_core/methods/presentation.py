@@ -38,7 +38,7 @@ def render_side_view(
     """Every frame of the clip from the side, as ``%06d.png`` with the source numbers."""
     turn = np.radians(configuration.side_deg) * np.asarray(up, np.float64)
     for row, (frame_index, time) in enumerate(zip(clip.frame_indices, clip.times, strict=True)):
-        camera = moved_around(clip.camera, turn, body_centre(scene, float(time)))
+        camera = moved_around(clip.camera, turn, scene.space.centre_at(float(time)))
         rgb, _ = scene.render(camera, float(time))
         write_picture(folder / f"{frame_index:06d}.png", as_bytes(rgb))
         progress((row + 1) / len(clip.frame_indices), f"side view of frame {frame_index}")
@@ -75,9 +75,4 @@ def orbit(
     for number, time in enumerate(times):
         angle = 2.0 * np.pi * number / len(times)
         turn = angle * np.asarray(up, np.float64)
-        yield moved_around(camera, turn, body_centre(scene, float(time)))
-
-
-def body_centre(scene: TrainedScene, time: float) -> NDArray[np.float64]:
-    """Mean of the body's control points at a normalised time, (3,) world metres."""
-    return scene.controls.at_time(time).observed[0].mean(axis=0).astype(np.float64)
+        yield moved_around(camera, turn, scene.space.centre_at(float(time)))

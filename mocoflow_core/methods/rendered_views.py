@@ -16,6 +16,7 @@ from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
 from mocoflow_core.methods.posed_mesh import ColouredMesh
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.metrics.views import spread_frames
+from mocoflow_core.rendering.posed_scene import PosedScene
 from mocoflow_core.rendering.trained_scene import TrainedScene
 
 Image = NDArray[np.float32]
@@ -60,6 +61,10 @@ class TrainedRenderer:
     def time(self, frame_index: float) -> float:
         """Normalised time of a source frame number, which may lie between frames."""
         return (frame_index - self._first) / self._length
+
+    def at(self, frame_index: float) -> PosedScene:
+        """The scene at a source frame number."""
+        return self.scene.at(self.time(frame_index))
 
     def render(self, camera: Camera, frame_index: int) -> tuple[Image, Image]:
         return self.scene.render(camera, self.time(frame_index))

@@ -84,8 +84,8 @@ def _kept_moments(
     """The states that the optimisation kept, in the order of its clock."""
     moments = []
     for snapshot in read_snapshots(trained):
-        scene = TrainedScene.open(trained, snapshot_weights(trained, snapshot))
-        scene.share_bodies(final.scene)
+        weights = snapshot_weights(trained, snapshot)
+        scene = TrainedScene.open(trained, weights, final.scene.space)
         renderer = TrainedRenderer(scene, clip)
         clock = before + Seconds(snapshot.wall_s, snapshot.cpu_s)
         state = (snapshot.step, clock.wall, clock.cpu, renderer)

@@ -15,9 +15,12 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rigid_controls import rigid_controls
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.fields.body_lattices import build_body_motion, canonical_nodes
+from mocoflow_core.fields.body_lattices import (
+    BodyMotionConfig,
+    build_body_motion,
+    canonical_nodes,
+)
 from mocoflow_core.fields.motion_body import BodyMotion
-from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.methods.rendered_views import TrainedRenderer
 from mocoflow_core.methods.scored_views import Subject
 from mocoflow_core.metrics.consensus import consensus_global_mm, consensus_local_mm
@@ -40,27 +43,31 @@ class TruthConfig(ConfigurationPart):
     points: int = Field(400, ge=1, description="Surface points, evenly spread over the vertices.")
     pairs_per_frame: int = Field(2, ge=1, description="Other frames each frame is reached from.")
     seed: int = Field(0, ge=0, description="Draws the pairs.")
+    # As far as the widest shell reaches.
+    reach_m: float = Field(
+        0.15, gt=0, description="How far from the given mesh its motion is known, metres."
+    )
+    spreading: BodyMotionConfig = BodyMotionConfig()
 
 
 class GivenMotion:
     """The motion of the given meshes, spread into space: what there was before."""
 
-    def __init__(self, renderer: TrainedRenderer, clip: Clip, given: MeshSequence) -> None:
+    def __init__(self, clip: Clip, given: MeshSequence, configuration: TruthConfig) -> None:
         """``given`` at the clip's frames, as they came."""
-        self._shape = renderer.scene.shape
         self._rows = {int(index): row for row, index in enumerate(clip.frame_indices)}
+        self._reach_m, self._body_config = configuration.reach_m, configuration.spreading
         density = pretrain_density(given, int(clip.frame_indices[0]), DensityConfig())
         self._prior = density.prior()
-        body = self._shape.motion.body
         self._controls = rigid_controls(
             density.vertices,
             given.vertices,
             given.faces,
             clip.times,
-            body.control_spacing_m,
-            body.neighbours,
+            self._body_config.control_spacing_m,
+            self._body_config.neighbours,
         )
-        self._canonical = canonical_nodes(self._controls, self._shape.shell_width_m, body)
+        self._canonical = canonical_nodes(self._controls, self._reach_m, self._body_config)
         self._bodies: dict[int, BodyMotion] = {}
 
     def to_canonical(self, points: Points, frame_index: int) -> Points:
@@ -76,8 +83,8 @@ class GivenMotion:
             self._bodies[frame_index] = build_body_motion(
                 self._controls.frames(np.array([self._rows[frame_index]])),
                 self._prior,
-                self._shape.shell_width_m,
-                self._shape.motion.body,
+                self._reach_m,
+                self._body_config,
                 self._canonical,
             )
         return self._bodies[frame_index]
@@ -85,21 +92,17 @@ class GivenMotion:
 
 @dataclass(frozen=True)
 class LearnedMotion:
-    """The optimised motion: the body's, corrected by the residual."""
+    """The optimised motion."""
 
     renderer: TrainedRenderer
 
     def to_canonical(self, points: Points, frame_index: int) -> Points:
-        moments = _moments(self.renderer, frame_index)
         row = torch.zeros(len(points), dtype=torch.int64)
-        motion = self.renderer.scene.field.motion
-        return _array(motion.to_canonical(_tensor(points), row, moments))
+        return _array(self.renderer.at(frame_index).to_canonical(_tensor(points), row)[0])
 
     def to_observed(self, points: Points, frame_index: int) -> Points:
-        moments = _moments(self.renderer, frame_index)
         row = torch.zeros(len(points), dtype=torch.int64)
-        motion = self.renderer.scene.field.motion
-        return _array(motion.to_observed(_tensor(points), row, moments)[0])
+        return _array(self.renderer.at(frame_index).to_observed(_tensor(points), row)[0])
 
 
 Motion = GivenMotion | LearnedMotion
@@ -124,7 +127,7 @@ def motion_rows(
     canonical = canonical_vertices.astype(np.float64)
     placed = np.stack([learned.to_observed(canonical, int(i)) for i in clip.frame_indices])
     states = (
-        ("posed_mesh", GivenMotion(renderer, clip, given), given.vertices.astype(np.float64)),
+        ("posed_mesh", GivenMotion(clip, given, configuration), given.vertices.astype(np.float64)),
         ("mocoflow", learned, placed),
     )
     rows = []
@@ -226,10 +229,6 @@ def _protocol(configuration: TruthConfig) -> str:
         f"{configuration.pairs_per_frame} others; keypoints by the mesh's regressor, or carried "
         "between frames where it has none"
     )
-
-
-def _moments(renderer: TrainedRenderer, frame_index: int) -> Moments:
-    return renderer.scene.moments(renderer.time(frame_index))
 
 
 def _tensor(points: Points) -> torch.Tensor:

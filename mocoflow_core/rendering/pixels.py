@@ -17,19 +17,19 @@ _CLOSEST_M = 0.05  # nodes nearer to the camera's plane than this cannot be proj
 
 
 @dataclass(frozen=True, eq=False)
-class ShellPixels:
-    """Pixels that the shell projects to, with the depth range of the shell behind each."""
+class VisiblePixels:
+    """Pixels that can show the person, with the depth range to be looked at behind each."""
 
     pixels: Tensor  # (N,) flat indices, ascending
     nearest: Tensor  # (N,) metres along the viewing axis
     farthest: Tensor  # (N,)
 
-    def select(self, keep: Tensor) -> ShellPixels:
+    def select(self, keep: Tensor) -> VisiblePixels:
         """Only the pixels where ``keep`` (N,) is true."""
-        return ShellPixels(self.pixels[keep], self.nearest[keep], self.farthest[keep])
+        return VisiblePixels(self.pixels[keep], self.nearest[keep], self.farthest[keep])
 
 
-def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: float) -> ShellPixels:
+def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: float) -> VisiblePixels:
     """Pixels that rays through the shell of one moment can belong to.
 
     Each lattice node of the shell paints a disc that covers its cell. Painted from far to near,
@@ -46,7 +46,7 @@ def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: floa
     farthest = _paint(camera, at[order], radius[order], depth[order])
     nearest = _paint(camera, at[order[::-1]], radius[order[::-1]], depth[order[::-1]])
     pixels = np.flatnonzero(farthest)
-    return ShellPixels(
+    return VisiblePixels(
         torch.from_numpy(pixels),
         torch.from_numpy(nearest.ravel()[pixels] - cell_radius).float(),
         torch.from_numpy(farthest.ravel()[pixels] + cell_radius).float(),

@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.geometry.rays import pixel_rays
 from mocoflow_core.rendering.compositing import sum_along_rays
-from mocoflow_core.rendering.pixels import shell_pixels
-from mocoflow_core.rendering.renderer import RenderedRays, render_rays
-from mocoflow_core.rendering.trained_scene import TrainedScene
+from mocoflow_core.rendering.posed_scene import RenderedRays
+from mocoflow_core.rendering.trained_scene import TrainedScene, render_pixels
 
 HALF_OPAQUE = math.log(2.0)  # exp(-thickness) = 1 / 2
-_RAYS_AT_ONCE = 16_384
 
 
 @torch.no_grad()
@@ -26,24 +23,12 @@ def surface_points(scene: TrainedScene, camera: Camera, time: float) -> NDArray[
 
     Pixels whose whole ray stays below an opacity of one half see nothing.
     """
-    moments = scene.moments(time)
-    appearance = scene.field.appearance_at(torch.tensor([time]))
-    shell = shell_pixels(camera, moments.body, 0, scene.shape.shell_width_m)
+    posed = scene.at(time)
+    visible = posed.pixels(camera, 0)
     found = []
-    for rows in torch.arange(len(shell.pixels)).split(_RAYS_AT_ONCE):
-        rays, along = pixel_rays(camera, shell.pixels[rows])
-        rendered = render_rays(
-            scene.field,
-            moments,
-            rays,
-            torch.zeros(len(rows), dtype=torch.int64),
-            shell.nearest[rows] * along,
-            shell.farthest[rows] * along,
-            appearance,
-            torch.ones(len(rows), 3),
-            torch.full((len(rows),), 0.5),
-            scene.shape.shell_width_m,
-            scene.sampling,
+    for chunk in torch.arange(len(visible.pixels)).split(posed.rays_at_once):
+        rays, rendered = render_pixels(
+            posed, camera, visible.select(chunk), torch.ones(len(chunk), 3)
         )
         found.append(half_opaque_points(rendered, rays.directions))
     return torch.cat(found).double().numpy() if found else np.empty((0, 3))
@@ -54,7 +39,7 @@ def half_opaque_points(rendered: RenderedRays, directions: Tensor) -> Tensor:
 
     A sample stands in the middle of its step, over which the density is constant.
     """
-    samples, rays = rendered.shell.samples, len(directions)
+    samples, rays = rendered.samples, len(directions)
     thickness = (rendered.density * samples.step_m).double()
     total = sum_along_rays(thickness, samples.ray, rays)
     before_ray = torch.cumsum(total, 0) - total

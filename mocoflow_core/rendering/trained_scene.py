@@ -11,60 +11,50 @@ from numpy.typing import NDArray
 from safetensors.torch import load_file
 from torch import Tensor
 
-from mocoflow_core.body.rigid_controls import RigidControls
-from mocoflow_core.fields.body_lattices import build_body_motion, canonical_nodes
-from mocoflow_core.fields.canonical_density import CanonicalDensity
-from mocoflow_core.fields.motion_body import BodyMotion
-from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.fields.scene_field import SceneField
-from mocoflow_core.fields.scene_shape import SceneShape
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.geometry.rays import pixel_rays
-from mocoflow_core.rendering.pixels import ShellPixels, shell_pixels
-from mocoflow_core.rendering.renderer import render_rays
-from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.geometry.rays import Rays, pixel_rays
+from mocoflow_core.rendering.pixels import VisiblePixels
+from mocoflow_core.rendering.posed_scene import PosedScene, RenderedRays, Space
+from mocoflow_core.rendering.shell_space import ShellSpace
 from mocoflow_core.threads import torch_threads
 
-_RAYS_AT_ONCE = 16_384
-
 Image = NDArray[np.float32]
+
+SPACES = {"hybrid": ShellSpace}
 
 
 class TrainedScene:
     """Renders deterministically: no jitter, no random state."""
 
-    def __init__(
-        self,
-        field: SceneField,
-        controls: RigidControls,
-        shape: SceneShape,
-        sampling: SamplingConfig,
-        threads: int = 1,
-    ) -> None:
+    def __init__(self, space: Space, field: SceneField, threads: int = 1) -> None:
+        self.space = space
         self.field = field.eval().requires_grad_(False)
-        self.controls = controls
-        self.shape = shape
-        self.sampling = sampling
         self.threads = threads  # as many as the optimisation found worth it
-        self._bodies: dict[float, BodyMotion] = {}
-        self._canonical = canonical_nodes(controls, shape.shell_width_m, shape.motion.body)
 
-    def share_bodies(self, other: TrainedScene) -> None:
-        """Take over the moments that another state of the same scene has already prepared."""
-        self._bodies = other._bodies
+    @classmethod
+    def open(
+        cls, folder: Path, weights: Path | None = None, space: Space | None = None
+    ) -> TrainedScene:
+        """Open a trained scene's folder, or one of its snapshots.
 
-    def moments(self, time: float) -> Moments:
-        """The motion at one moment, normalised time in [0, 1]."""
-        if time not in self._bodies:
-            self._bodies[time] = build_body_motion(
-                self.controls.at_time(time),
-                self.field.canonical.prior,
-                self.shape.shell_width_m,
-                self.shape.motion.body,
-                self._canonical,
-            )
-        codes = self.field.motion.codes_at(torch.tensor([time]))
-        return Moments(self._bodies[time], codes)
+        Args:
+            space: of another state of the same scene, with the moments that it has prepared.
+
+        Raises:
+            FileNotFoundError: where a part of the scene is missing.
+        """
+        space = space or open_space(folder)
+        field = space.build()
+        field.load_state_dict(load_file(weights or folder / "model.safetensors"))
+        result = folder / "result.json"
+        threads = json.loads(result.read_text())["threads"] if result.is_file() else 1
+        return cls(space, field, threads)
+
+    def at(self, time: float) -> PosedScene:
+        """The scene at a normalised time; outside [0, 1] it is clamped to the clip."""
+        moment = torch.tensor([np.clip(time, 0.0, 1.0)], dtype=torch.float64)
+        return self.space.at(self.field, moment)
 
     @torch.no_grad()
     def render(
@@ -80,61 +70,41 @@ class TrainedScene:
         Returns:
             rgb (H, W, 3) in [0, 1] and opacity (H, W).
         """
-        time = float(np.clip(time, 0.0, 1.0))
-        moments = self.moments(time)
-        appearance = self.field.appearance_at(torch.tensor([time]))
         behind = np.ones((camera.height, camera.width, 3), np.float32)
         if background is not None:
             behind = background.astype(np.float32)
         rgb = torch.from_numpy(behind.reshape(-1, 3).copy())
         opacity = torch.zeros(len(rgb))
-        shell = shell_pixels(camera, moments.body, 0, self.shape.shell_width_m)
+        posed = self.at(time)
+        visible = posed.pixels(camera, 0)
         with torch_threads(self.threads):
-            self._fill(rgb, opacity, camera, shell, moments, appearance)
+            for chunk in torch.arange(len(visible.pixels)).split(posed.rays_at_once):
+                pixels = visible.pixels[chunk]
+                _, rendered = render_pixels(posed, camera, visible.select(chunk), rgb[pixels])
+                rgb[pixels] = rendered.rgb
+                opacity[pixels] = rendered.opacity
         size = (camera.height, camera.width)
         return rgb.numpy().reshape(*size, 3), opacity.numpy().reshape(size)
 
-    def _fill(
-        self,
-        rgb: Tensor,
-        opacity: Tensor,
-        camera: Camera,
-        shell: ShellPixels,
-        moments: Moments,
-        appearance: Tensor,
-    ) -> None:
-        """Render the shell's pixels into ``rgb`` (H W, 3), which holds what is behind them."""
-        for rows in torch.arange(len(shell.pixels)).split(_RAYS_AT_ONCE):
-            chunk = shell.pixels[rows]
-            rays, along = pixel_rays(camera, chunk)
-            rendered = render_rays(
-                self.field,
-                moments,
-                rays,
-                torch.zeros(len(chunk), dtype=torch.int64),
-                shell.nearest[rows] * along,
-                shell.farthest[rows] * along,
-                appearance,
-                rgb[chunk],
-                torch.full((len(chunk),), 0.5),
-                self.shape.shell_width_m,
-                self.sampling,
-            )
-            rgb[chunk] = rendered.rgb
-            opacity[chunk] = rendered.opacity
 
-    @classmethod
-    def open(cls, folder: Path, weights: Path | None = None) -> TrainedScene:
-        """Open a trained scene's folder, or one of its snapshots.
+def render_pixels(
+    posed: PosedScene, camera: Camera, visible: VisiblePixels, background: Tensor
+) -> tuple[Rays, RenderedRays]:
+    """Pixels (N,) of a camera at a scene's only moment, over background (N, 3); no jitter."""
+    count = len(visible.pixels)
+    rays, along = pixel_rays(camera, visible.pixels)
+    rendered = posed.render(
+        rays,
+        torch.zeros(count, dtype=torch.int64),
+        visible.nearest * along,
+        visible.farthest * along,
+        background,
+        torch.full((count, posed.jitters), 0.5),
+    )
+    return rays, rendered
 
-        Raises:
-            FileNotFoundError: where a part of the scene is missing.
-        """
-        shape = SceneShape.model_validate_json((folder / "shape.json").read_text())
-        density = CanonicalDensity.load(folder)
-        field = shape.build(density.prior())
-        field.load_state_dict(load_file(weights or folder / "model.safetensors"))
-        sampling = SamplingConfig(step_m=shape.step_m, inner_depth_m=shape.inner_depth_m)
-        result = folder / "result.json"
-        threads = json.loads(result.read_text())["threads"] if result.is_file() else 1
-        return cls(field, RigidControls.load(folder), shape, sampling, threads)
+
+def open_space(folder: Path) -> Space:
+    """What a trained scene's folder holds besides the weights."""
+    shape = json.loads((folder / "shape.json").read_text())
+    return SPACES[shape["representation"]].load(folder)

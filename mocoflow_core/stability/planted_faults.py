@@ -59,6 +59,11 @@ def _in_frame(run: TrainingRun, batch: Batch) -> Batch:
     return replace(batch, rgb=rgb)
 
 
+def _table(run: TrainingRun) -> Tensor:
+    """The coarsest feature table."""
+    return run.field.rate_groups().features[0]
+
+
 def _in_ray(run: TrainingRun, batch: Batch) -> Batch:
     directions = batch.rays.directions.clone()
     directions[0, 0] = torch.nan
@@ -67,7 +72,7 @@ def _in_ray(run: TrainingRun, batch: Batch) -> Batch:
 
 def _in_weight(run: TrainingRun, batch: Batch) -> Batch:
     with torch.no_grad():
-        run.field.canonical.tables[0][0, 0] = torch.nan
+        _table(run)[0, 0] = torch.nan
     return batch
 
 
@@ -80,13 +85,13 @@ def _in_gradient(run: TrainingRun, batch: Batch) -> Batch:
         spoilt[0, 0] = torch.nan
         return spoilt
 
-    handle = run.field.canonical.tables[0].register_hook(plant)
+    handle = _table(run).register_hook(plant)
     return batch
 
 
 def _in_optimiser(run: TrainingRun, batch: Batch) -> Batch:
     """A moment that is no number spoils the weights with the next update."""
-    run.optimiser.state[run.field.canonical.tables[0]]["exp_avg"][0, 0] = torch.nan
+    run.optimiser.state[_table(run)]["exp_avg"][0, 0] = torch.nan
     return batch
 
 

@@ -9,25 +9,24 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.motion_body import BodyMotion
-from mocoflow_core.fields.motion_hybrid import Moments
-from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.geometry.grid import SparseGrids
 from mocoflow_core.geometry.rays import Rays
 from mocoflow_core.stability.case import Case, Found
 from mocoflow_core.stability.toy_scene import Outcome, toy, train
 from mocoflow_core.training.batches import Batch, TrainingPixels
 from mocoflow_core.training.loop import TrainingRun
-from mocoflow_core.training.objective import Objective
+from mocoflow_core.training.objective import ShellObjective
 
 KINDS = ("float32", "autocast bfloat16", "autocast float16")
 AUTOCAST = {"autocast bfloat16": torch.bfloat16, "autocast float16": torch.float16}
 
 
-class AutocastObjective(Objective):
+class AutocastObjective(ShellObjective):
     """The same losses with the networks' products in a shorter type."""
 
-    def __init__(self, own: Objective, kind: str) -> None:
+    def __init__(self, own: ShellObjective, kind: str) -> None:
         self.__dict__.update(own.__dict__)
         self.kind = kind
 
@@ -72,17 +71,22 @@ def _doubled_body(body: BodyMotion) -> BodyMotion:
     )
 
 
-def _to_double(field: SceneField, objective: Objective) -> None:
+def _to_double(field: HybridField, objective: ShellObjective) -> None:
     """Weights, look-up tables and lattices in float64, in place."""
     field.double()
     field.canonical.grids = [_doubled_grids(grids) for grids in field.canonical.grids]
-    body = _doubled_body(objective.moments.body)
-    objective.moments = Moments(body, field.motion.codes)
+    objective.scene.body = _doubled_body(objective.scene.body)
 
 
 def _in_double(run: TrainingRun) -> None:
-    _to_double(run.field, run.objective)
+    objective = _losses(run)
+    _to_double(objective.scene.field, objective)
     run.pixels = DoublePixels(run.pixels)
+
+
+def _losses(run: TrainingRun) -> ShellObjective:
+    assert isinstance(run.objective, ShellObjective)
+    return run.objective
 
 
 @cache
@@ -91,7 +95,7 @@ def _trained(kind: str) -> Outcome:
         if kind == "float64":
             _in_double(run)
         elif kind in AUTOCAST:
-            run.objective = AutocastObjective(run.objective, kind)
+            run.objective = AutocastObjective(_losses(run), kind)
 
     return train(toy(), disturb=disturb)
 

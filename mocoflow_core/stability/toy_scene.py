@@ -7,7 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -21,21 +21,22 @@ from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
-from mocoflow_core.fields.motion_hybrid import Moments
+from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.motion_residual import ResidualConfig
-from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.metrics.psnr import psnr
 from mocoflow_core.metrics.score import on_white
 from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.rendering.shell_scene import ShellScene
+from mocoflow_core.rendering.shell_space import ShellSpace
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.synthetic.toy import ToyConfig, write_toy_scene
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.loop import TrainingRun
-from mocoflow_core.training.objective import Objective
+from mocoflow_core.training.objective import ShellObjective
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
 from mocoflow_core.training.schedule import ScheduleConfig
 
@@ -71,23 +72,30 @@ class Prepared:
     motion: MotionStart
     shape: SceneShape
 
-    def field(self, seed: int = 0) -> SceneField:
+    @cached_property
+    def space(self) -> ShellSpace:
+        return ShellSpace(self.shape, self.density, self.motion.controls)
+
+    def field(self, seed: int = 0) -> HybridField:
         torch.manual_seed(seed)
-        return self.shape.build(self.density.prior())
+        return self.space.build()
+
+    def scene(self, field: HybridField) -> ShellScene:
+        """At the training frames."""
+        return self.space.at_training_frames(field, self.motion.body)
 
     def pixels(self) -> TrainingPixels:
-        return TrainingPixels(self.clip, self.motion.body, self.shape.shell_width_m)
+        return TrainingPixels(self.clip, self.scene(self.field()))
 
-    def objective(self, field: SceneField) -> Objective:
-        moments = Moments(self.motion.body, field.motion.codes)
-        return Objective(field, moments, LOSSES, SAMPLING, self.shape.shell_width_m, True)
+    def objective(self, field: HybridField) -> ShellObjective:
+        return ShellObjective(self.scene(field), LOSSES, motion_learned=True)
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What an optimisation left."""
 
-    field: SceneField
+    field: HybridField
     events: list[str]
     psnr: float  # dB, at views of another camera, over the union of both masks
 
@@ -180,9 +188,9 @@ def undisturbed(seed: int = 0) -> Outcome:
     return train(toy(), seed=seed)
 
 
-def score(prepared: Prepared, field: SceneField, other: Clip) -> float:
+def score(prepared: Prepared, field: HybridField, other: Clip) -> float:
     """Mean PSNR (dB) at views of another camera, on white, over the union of both masks."""
-    scene = TrainedScene(field, prepared.motion.controls, prepared.shape, SAMPLING)
+    scene = TrainedScene(prepared.space, field)
     rows = np.linspace(0, len(other.frames) - 1, SCORED_VIEWS).round().astype(int)
     found = []
     for row in rows:

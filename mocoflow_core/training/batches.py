@@ -10,9 +10,8 @@ from torch import Tensor
 
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
-from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.geometry.rays import Rays, pixel_rays
-from mocoflow_core.rendering.pixels import shell_pixels
+from mocoflow_core.rendering.posed_scene import PosedScene
 from mocoflow_core.training.held_out import HeldOutPixels
 from mocoflow_core.training.ranks import ALONE, Ranks
 
@@ -24,32 +23,32 @@ class Batch:
     rays: Rays
     rays_in_all: int  # of the step, on all ranks
     row: Tensor  # (R,) training frame of each ray
-    near: Tensor  # (R,) metres along the ray between which the shell lies
+    near: Tensor  # (R,) metres along the ray between which the person can be
     far: Tensor  # (R,)
     rgb: Tensor  # (R, 3) in [0, 1]
     mask: Tensor  # (R,) 1 on the person
     has_mask: Tensor  # (R,) 0 where the frame came without a mask
     background: Tensor  # (R, 3)
-    jitter: Tensor  # (R,) in [0, 1)
+    jitter: Tensor  # (R, J) in [0, 1), as many as the scene's rays take
 
 
 class TrainingPixels:
-    """The training frames of a clip and, per frame, the pixels that the shell projects to.
+    """The training frames of a clip and, per frame, the pixels that can show the person.
 
-    Pixels that the shell does not reach show the background whatever is learned, so no ray goes
-    there; nor to those that are held out to score the run. Raises InputError where the body is in
-    sight of no frame.
+    The others show the background whatever is learned, so no ray goes there; nor to those that are
+    held out to score the run. Raises InputError where the body is in sight of no frame.
     """
 
     def __init__(
         self,
         clip: Clip,
-        body: BodyMotion,
-        shell_width_m: float,
+        scene: PosedScene,
         held_out: HeldOutPixels | None = None,
         ranks: Ranks = ALONE,
     ) -> None:
+        """Args: scene with a row for each training frame."""
         rows = np.flatnonzero(~clip.held_out)
+        self.jitters = scene.jitters
         self.camera = clip.camera
         self.ranks = ranks
         pixels = clip.camera.width * clip.camera.height
@@ -57,14 +56,14 @@ class TrainingPixels:
         self.masks = torch.from_numpy(clip.masks[rows].reshape(len(rows), pixels))
         self.has_mask = torch.from_numpy(clip.has_mask[rows])
         self.background = torch.from_numpy(clip.background.reshape(pixels, 3).copy())
-        shells = [shell_pixels(clip.camera, body, row, shell_width_m) for row in range(len(rows))]
+        visible = [scene.pixels(clip.camera, row) for row in range(len(rows))]
         if held_out is not None:
             kept_out = torch.from_numpy(held_out.mask(clip)[rows])
-            shells = [s.select(~kept_out[row][s.pixels]) for row, s in enumerate(shells)]
-        self.candidates = torch.cat([shell.pixels for shell in shells])
-        self.nearest = torch.cat([shell.nearest for shell in shells])
-        self.farthest = torch.cat([shell.farthest for shell in shells])
-        self.counts = torch.tensor([len(shell.pixels) for shell in shells])
+            visible = [v.select(~kept_out[row][v.pixels]) for row, v in enumerate(visible)]
+        self.candidates = torch.cat([v.pixels for v in visible])
+        self.nearest = torch.cat([v.nearest for v in visible])
+        self.farthest = torch.cat([v.farthest for v in visible])
+        self.counts = torch.tensor([len(v.pixels) for v in visible])
         self.starts = torch.cumsum(self.counts, 0) - self.counts
         # A person who has left the picture leaves a frame without candidates.
         self.in_sight = self.counts.nonzero()[:, 0]
@@ -95,7 +94,7 @@ class TrainingPixels:
         chosen = self.in_sight[draws]
         row = chosen.repeat_interleave(-(-rays // frames))[:rays]
         place = torch.rand(rays, generator=generator, dtype=torch.float64)
-        jitter = torch.rand(rays, generator=generator)
+        jitter = torch.rand(rays, self.jitters, generator=generator)
         mine = self.ranks.part(rays)
         row, place = row[mine], place[mine]
         found = self.starts[row] + (place * self.counts[row]).long()

@@ -11,18 +11,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.fields.body_lattices import build_body_motion
-from mocoflow_core.fields.motion_body import BodyMotion
-from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.fields.scene_field import SceneField
-from mocoflow_core.fields.scene_shape import SceneShape
 from mocoflow_core.geometry.rays import Rays, pixel_rays
 from mocoflow_core.metrics.psnr import psnr
 from mocoflow_core.metrics.views import spread_frames
-from mocoflow_core.rendering.pixels import shell_pixels
-from mocoflow_core.rendering.renderer import render_rays
-from mocoflow_core.rendering.sampling import SamplingConfig
-from mocoflow_core.training.fit_motion import MotionStart
+from mocoflow_core.rendering.posed_scene import PosedScene, Space
 
 # Scored pixels are those of the person and of a rim around it, a share of the longer side wide:
 # density that stands off the person must cost something.
@@ -100,71 +93,55 @@ def _rim(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 class HeldOutScore:
     """The rays of held-out pixels, ready to be rendered again and again."""
 
+    scene: PosedScene  # at the moments of the pixels, with the weights that are being learned
     rays: Rays
     row: Tensor  # (P,) moment of each ray
-    near: Tensor  # (P,) metres; no shell where far is 0
+    near: Tensor  # (P,) metres; nothing to be seen where far is 0
     far: Tensor
     rgb: NDArray[np.float32]  # (P, 3) what the camera saw
     background: Tensor  # (P, 3)
-    body: BodyMotion
-    times: Tensor  # (G,) of the moments
-    shell_width_m: float
-    sampling: SamplingConfig
 
     @classmethod
     def prepare(
-        cls,
-        clip: Clip,
-        held_out: HeldOutPixels,
-        motion: MotionStart,
-        shape: SceneShape,
-        field: SceneField,
-        sampling: SamplingConfig,
+        cls, clip: Clip, held_out: HeldOutPixels, space: Space, field: SceneField
     ) -> HeldOutScore:
-        """Build the body's motion at the moments of the pixels."""
+        """Prepare the scene at the moments of the pixels."""
         moments, row = np.unique(held_out.rows, return_inverse=True)
-        body = build_body_motion(
-            motion.controls.frames(moments),
-            field.canonical.prior,
-            shape.shell_width_m,
-            shape.motion.body,
-        )
+        scene = space.at(field, torch.from_numpy(clip.times[moments]))
         pixel = torch.from_numpy(held_out.pixels)
         rays, along = pixel_rays(clip.camera, pixel)
         depths = np.zeros((2, len(moments), clip.camera.width * clip.camera.height), np.float32)
         for moment in range(len(moments)):
-            shell = shell_pixels(clip.camera, body, moment, shape.shell_width_m)
-            depths[:, moment, shell.pixels.numpy()] = shell.nearest.numpy(), shell.farthest.numpy()
+            seen = scene.pixels(clip.camera, moment)
+            depths[:, moment, seen.pixels.numpy()] = seen.nearest.numpy(), seen.farthest.numpy()
         near, far = torch.from_numpy(depths[:, row, held_out.pixels]) * along
-        seen = clip.frames.reshape(len(clip.frames), -1, 3)[held_out.rows, held_out.pixels]
+        rgb = clip.frames.reshape(len(clip.frames), -1, 3)[held_out.rows, held_out.pixels]
         behind = clip.background.reshape(-1, 3)[held_out.pixels]
         return cls(
+            scene,
             rays,
             torch.from_numpy(row),
             near,
             far,
-            seen.astype(np.float32) / 255.0,
+            rgb.astype(np.float32) / 255.0,
             torch.from_numpy(behind.astype(np.float32) / 255.0),
-            body,
-            torch.from_numpy(clip.times[moments]),
-            shape.shell_width_m,
-            sampling,
         )
 
     @torch.no_grad()
-    def __call__(self, field: SceneField) -> float:
-        """``train_psnr`` of a field, in dB: rendered over the background, no random numbers."""
-        rendered = render_rays(
-            field,
-            Moments(self.body, field.motion.codes_at(self.times)),
-            self.rays,
-            self.row,
-            self.near,
-            self.far,
-            field.appearance_at(self.times),
-            self.background,
-            torch.full_like(self.near, 0.5),
-            self.shell_width_m,
-            self.sampling,
-        )
-        return psnr(rendered.rgb.numpy(), self.rgb)
+    def __call__(self) -> float:
+        """``train_psnr`` of the present weights, dB: over the background, no random numbers."""
+        parts = [self._rendered(rows) for rows in self._chunks()]
+        return psnr(torch.cat(parts).numpy(), self.rgb)
+
+    def _chunks(self) -> tuple[Tensor, ...]:
+        return torch.arange(len(self.rays)).split(self.scene.rays_at_once)
+
+    def _rendered(self, rows: Tensor) -> Tensor:
+        return self.scene.render(
+            self.rays.select(rows),
+            self.row[rows],
+            self.near[rows],
+            self.far[rows],
+            self.background[rows],
+            torch.full((len(rows), self.scene.jitters), 0.5),
+        ).rgb

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import torch
 from pydantic import JsonValue
-from torch import Tensor, nn
+from torch import Tensor
 
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
@@ -36,7 +36,7 @@ _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
 _START_RAYS = 1024  # that tell how large the losses are at the start
 
-Score = Callable[[SceneField], float]
+Score = Callable[[], float]
 Chosen = TypeVar("Chosen", int, int | None)
 
 
@@ -67,7 +67,6 @@ class TrainingRun:
     ) -> None:
         self.field = field
         self.objective = objective
-        self._shared: nn.Module = objective  # wrapped when the steps begin
         self.pixels = pixels
         self.schedule = schedule
         self.before = before
@@ -116,7 +115,7 @@ class TrainingRun:
 
     def run(self) -> None:
         """All remaining steps."""
-        self._shared = self.ranks.wrap(self.objective)
+        self._shared = self.ranks.share(self.field, self.objective)
         with torch_threads(self._threads(self.progress.threads)):
             self._steps()
 
@@ -204,8 +203,7 @@ class TrainingRun:
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
         schedule, step = self.schedule, self.progress.step
-        bands = self.field.motion.residual_to_canonical.encoding.bands
-        self.field.anneal(band_alpha(share, schedule.coarse_share, bands))
+        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands))
         factor = rate_factor(share, schedule.final_rate) * self.guard.rate_scale
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
@@ -258,7 +256,7 @@ class TrainingRun:
 
     def _train_psnr(self) -> float | None:
         with self.clock.paused():
-            return self.ranks.first(lambda: None if self.score is None else self.score(self.field))
+            return self.ranks.first(lambda: None if self.score is None else self.score())
 
     def _save(self) -> None:
         if self.guard.problem({}) is not None:
@@ -281,12 +279,9 @@ def _joint(terms: dict[str, Tensor], ranks: Ranks) -> dict[str, Tensor]:
 
 
 def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:
-    features = list(field.canonical.tables)
-    networks = [p for n, p in field.canonical.named_parameters() if not n.startswith("tables.")]
-    motion = [*field.motion.parameters(), field.appearance]
+    rates = (schedule.rate_features, schedule.rate_networks, schedule.rate_motion)
     groups = [
-        {"params": features, "lr": schedule.rate_features},
-        {"params": networks, "lr": schedule.rate_networks},
-        {"params": motion, "lr": schedule.rate_motion},
+        {"params": parameters, "lr": rate}
+        for parameters, rate in zip(field.rate_groups(), rates, strict=True)
     ]
     return torch.optim.Adam(groups, betas=(0.9, 0.99), eps=1e-10, fused=True)

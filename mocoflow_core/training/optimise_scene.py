@@ -7,39 +7,20 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import torch
-from pydantic import JsonValue
 from safetensors.torch import save_file
 
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
-from mocoflow_core.fields.canonical_density import CanonicalDensity
-from mocoflow_core.fields.motion_hybrid import Moments
-from mocoflow_core.fields.scene_field import SceneField
-from mocoflow_core.fields.scene_shape import SceneShape
-from mocoflow_core.losses.weights import LossConfig
-from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.checkpoint import Progress
 from mocoflow_core.training.clock import Seconds, TrainingClock
-from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.held_out import HeldOutPixels, HeldOutScore, draw_held_out
 from mocoflow_core.training.loop import TrainingRun
-from mocoflow_core.training.objective import Objective
-from mocoflow_core.training.ranks import ALONE, Ranks
+from mocoflow_core.training.problem import Problem
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot, read_snapshots
 
 RESULT = "result.json"
-
-
-@dataclass(frozen=True)
-class Learned:
-    """Which parts of the field this scene needs; the plan decides."""
-
-    motion_residual: bool = True
-    consensus: bool = True
-    appearance_codes: bool = True
 
 
 @dataclass(frozen=True)
@@ -70,12 +51,7 @@ def unwatched(curve: list[Snapshot]) -> None:
 
 def optimise_scene(
     clip: Clip,
-    density: CanonicalDensity,
-    motion: MotionStart,
-    shape: SceneShape,
-    learned: Learned,
-    losses: LossConfig,
-    sampling: SamplingConfig,
+    problem: Problem,
     schedule: ScheduleConfig,
     seed: int,
     before: Seconds,
@@ -83,20 +59,20 @@ def optimise_scene(
     progress: Callable[[float, str], None],
     watch: Callable[[list[Snapshot]], None] = unwatched,
     clock: TrainingClock | None = None,
-    ranks: Ranks = ALONE,
 ) -> OptimisationResult:
     """Train the fields of a scene; resume from the workspace's checkpoint if there is one.
 
-    Writes the trained scene (``model.safetensors``, ``shape.json``, the density and the controls),
+    Writes the trained scene (``model.safetensors`` and what else is needed to open it),
     ``snapshots/%06d.safetensors`` at geometric times with ``snapshots.json``, and ``result.json``.
 
     Args:
+        problem: what is learned and from what; its field is trained in place. Where several ranks
+            share its rays, each calls this with the same arguments and gets the same result; the
+            first alone writes, reports and is watched.
         before: training clock of the stages so far.
         workspace: folder that survives a kill.
         watch: is given all snapshots so far whenever there is a new one.
         clock: of this stage; it must have been started just now.
-        ranks: the processes that share the rays of each step. Each calls this with the same
-            arguments and gets the same result; the first alone writes, reports and is watched.
 
     Raises:
         InputError: a train_psnr to reach, on a scene without any mask to measure it on.
@@ -105,27 +81,18 @@ def optimise_scene(
 
     Source: MoCo-Flow sec. 3.4, third stage.
     """
-    clock = clock or TrainingClock()
-    torch.manual_seed(seed)
-    field = shape.build(density.prior())
-    _freeze_what_is_not_needed(field, learned)
-    body = motion.body
-    moments = Moments(body, field.motion.codes)
-    weights = losses if learned.consensus else losses.model_copy(update={"consensus_weight": 0.0})
-    objective = Objective(
-        field, moments, weights, sampling, shape.shell_width_m, learned.motion_residual, ranks
-    )
+    clock, ranks = clock or TrainingClock(), problem.ranks
     with clock.paused():
         held_out = draw_held_out(clip, schedule.held_out_pixels)
         _require_pixels_to_score(held_out, schedule)
         score = None
         if held_out is not None and ranks.is_first:
-            score = HeldOutScore.prepare(clip, held_out, motion, shape, field, sampling)
-    pixels = TrainingPixels(clip, body, shape.shell_width_m, held_out, ranks)
-    ranks.first(lambda: write_scene_parts(workspace, shape, density, motion))
+            score = HeldOutScore.prepare(clip, held_out, problem.space, problem.field)
+    pixels = TrainingPixels(clip, problem.scene, held_out, ranks)
+    ranks.first(lambda: _begin(problem, workspace))
     run = TrainingRun(
-        field,
-        objective,
+        problem.field,
+        problem.objective,
         pixels,
         schedule,
         seed,
@@ -135,40 +102,16 @@ def optimise_scene(
         watch,
         score,
         clock,
-        ranks,
-        _settings(shape, learned, losses, sampling, schedule, seed),
+        problem.ranks,
+        {**problem.settings, "schedule": schedule.deciding(), "seed": seed},
     )
     run.run()
     return OptimisationResult.from_json(ranks.first(lambda: _finish(run, before, held_out)))
 
 
-def write_scene_parts(
-    folder: Path, shape: SceneShape, density: CanonicalDensity, motion: MotionStart
-) -> None:
-    """Everything besides the weights that a trained scene needs to be opened alone."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "shape.json").write_text(shape.model_dump_json(indent=1))
-    density.save(folder)
-    motion.controls.save(folder)
-
-
-def _settings(
-    shape: SceneShape,
-    learned: Learned,
-    losses: LossConfig,
-    sampling: SamplingConfig,
-    schedule: ScheduleConfig,
-    seed: int,
-) -> dict[str, JsonValue]:
-    """What decides where a run ends, and so whether it may go on from a checkpoint."""
-    return {
-        "shape": shape.model_dump(mode="json"),
-        "learned": asdict(learned),
-        "losses": losses.model_dump(mode="json"),
-        "sampling": sampling.model_dump(mode="json"),
-        "schedule": schedule.model_dump(mode="json", exclude={"threads", "checkpoint_every_s"}),
-        "seed": seed,
-    }
+def _begin(problem: Problem, workspace: Path) -> None:
+    workspace.mkdir(parents=True, exist_ok=True)
+    problem.space.save(workspace)
 
 
 def _finish(run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None) -> str:
@@ -178,11 +121,6 @@ def _finish(run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None) -
     (run.workspace / RESULT).write_text(result)
     run.forget_checkpoint()
     return result
-
-
-def _freeze_what_is_not_needed(field: SceneField, learned: Learned) -> None:
-    field.motion.requires_grad_(learned.motion_residual)
-    field.appearance.requires_grad_(learned.appearance_codes)
 
 
 def _require_pixels_to_score(held_out: HeldOutPixels | None, schedule: ScheduleConfig) -> None:

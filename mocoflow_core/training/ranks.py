@@ -8,8 +8,9 @@ sums over ranks, and whatever is decided is decided on joint values or by the fi
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import torch
@@ -21,6 +22,7 @@ from torch.nn.parallel import DistributedDataParallel
 from mocoflow_core.training.clock import Seconds
 
 Value = TypeVar("Value", bound=JsonValue)
+Losses = Callable[..., dict[str, Tensor]]
 
 
 class FirstRankFailed(RuntimeError):
@@ -41,9 +43,13 @@ class Ranks:
         """Which of so many rays are this rank's: all of them once, in order, evenly."""
         return slice(self.rank * whole // self.count, (self.rank + 1) * whole // self.count)
 
-    def wrap(self, objective: nn.Module) -> nn.Module:
-        """The objective with gradients that are means over ranks, of equal starting weights."""
-        return objective
+    def share(self, model: nn.Module, losses: Losses) -> Losses:
+        """The losses with gradients of the model that are means over ranks.
+
+        The model's weights become those of the first rank; they stay equal as long as every rank
+        takes the same steps. Keep what is returned until the gradients are there.
+        """
+        return losses
 
     def total(self, own: Tensor) -> Tensor:
         """Sum over ranks, the same to the last bit on all of them; carries no gradient."""
@@ -76,6 +82,18 @@ class Ranks:
 ALONE = Ranks()
 
 
+class _Shared(nn.Module):
+    """Losses as the module that they are for torch: whose weights they pull on."""
+
+    def __init__(self, model: nn.Module, losses: Losses) -> None:
+        super().__init__()
+        self.model = model
+        self._losses = losses
+
+    def forward(self, *given: Any) -> dict[str, Tensor]:  # noqa: ANN401 - whatever they take
+        return self._losses(*given)
+
+
 class SeveralRanks(Ranks):
     """One process of torch's default process group, which must exist already.
 
@@ -86,11 +104,14 @@ class SeveralRanks(Ranks):
         self.rank = process_group.get_rank()
         self.count = process_group.get_world_size()
 
-    def wrap(self, objective: nn.Module) -> nn.Module:
-        # A rank whose rays meet no sample uses none of some networks.
-        return DistributedDataParallel(
-            objective, broadcast_buffers=False, find_unused_parameters=True
-        )
+    def share(self, model: nn.Module, losses: Losses) -> Losses:
+        with warnings.catch_warnings():
+            # The newer name of this option is not in every torch that will do.
+            warnings.simplefilter("ignore", FutureWarning)
+            # Buffers never change; a loss of weight zero leaves a network out.
+            return DistributedDataParallel(
+                _Shared(model, losses), broadcast_buffers=False, find_unused_parameters=True
+            )
 
     def total(self, own: Tensor) -> Tensor:
         summed = own.detach().clone()

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
-from mocoflow_core.fields.scene_field import SceneField
+from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
 from tests.rigid_figures import ellipsoid, near_surface, prior_of, single
 
@@ -17,7 +17,7 @@ def prior():
     return prior_of(ellipsoid())
 
 
-def scene_field(prior, light: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SceneField:
+def scene_field(prior, light: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> HybridField:
     torch.manual_seed(0)
     shape = SceneShape(
         canonical=CONFIGURATION,
@@ -35,7 +35,7 @@ def points(within_m: float = 0.05) -> torch.Tensor:
     return single(near_surface(ellipsoid(), within_m))
 
 
-def asked(field: SceneField, where: torch.Tensor, facing: tuple[float, ...] = (0.0, 0.0, 1.0)):
+def asked(field: HybridField, where: torch.Tensor, facing: tuple[float, ...] = (0.0, 0.0, 1.0)):
     code = torch.zeros(len(where), CONFIGURATION.appearance_width)
     return field.canonical(where, code, torch.tensor(facing).expand(len(where), 3))
 

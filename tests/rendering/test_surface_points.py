@@ -4,7 +4,7 @@ import math
 
 import torch
 
-from mocoflow_core.rendering.renderer import RenderedRays, ShellSamples
+from mocoflow_core.rendering.posed_scene import RenderedRays
 from mocoflow_core.rendering.sampling import PackedSamples
 from mocoflow_core.rendering.surface_points import half_opaque_points
 
@@ -18,9 +18,8 @@ def crossing(density, step):
     ray = torch.arange(2).repeat_interleave(count)
     samples = PackedSamples(points, ray, torch.full((2 * count,), step))
     nothing = torch.empty(0)
-    shell = ShellSamples(samples, nothing, nothing, nothing)
     both = torch.cat([torch.as_tensor(density), torch.full((count,), 1e-3)])
-    rendered = RenderedRays(nothing, nothing, shell, both, nothing, nothing)
+    rendered = RenderedRays(nothing, nothing, samples, both)
     return half_opaque_points(rendered, torch.tensor([[0.0, 0.0, 1.0]]).repeat(2, 1))
 
 

@@ -12,7 +12,7 @@ from tests.toy_training import SHELL_M
 
 @pytest.fixture(scope="module")
 def pixels(prepared):
-    return TrainingPixels(prepared.clip, prepared.motion.body, SHELL_M)
+    return TrainingPixels(prepared.clip, prepared.scene())
 
 
 def batch(pixels: TrainingPixels, seed: int = 0, rays: int = 500):
@@ -40,7 +40,7 @@ def test_held_out_frames_never_enter_a_batch(prepared):
     magenta = np.array([255, 0, 255], np.uint8)
     frames = np.full_like(clip.frames, 90)
     frames[clip.held_out] = magenta
-    planted = TrainingPixels(replace(clip, frames=frames), prepared.motion.body, SHELL_M)
+    planted = TrainingPixels(replace(clip, frames=frames), prepared.scene())
     for seed in range(5):
         assert batch(planted, seed).rgb.numpy() == pytest.approx(90 / 255)
 
@@ -100,7 +100,7 @@ def test_frames_without_a_mask_say_so(prepared):
     has_mask = clip.has_mask.copy()
     first = np.flatnonzero(~clip.held_out)[0]
     has_mask[first] = False
-    found = batch(TrainingPixels(replace(clip, has_mask=has_mask), prepared.motion.body, SHELL_M))
+    found = batch(TrainingPixels(replace(clip, has_mask=has_mask), prepared.scene()))
     assert torch.equal(found.has_mask == 0, found.row == 0)
 
 
@@ -122,6 +122,8 @@ def test_a_frame_whose_person_is_out_of_sight_gives_no_rays(prepared):
             body.canonical_grid,
             body.canonical_maps,
         )
-        found = batch(TrainingPixels(clip, moved, SHELL_M))
+        scene = prepared.scene()
+        scene.body = moved
+        found = batch(TrainingPixels(clip, scene))
         assert not (found.row == away).any()
         assert torch.isfinite(found.near).all()

@@ -13,7 +13,6 @@ from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training.batches import TrainingPixels
 from mocoflow_core.training.held_out import HeldOutScore, draw_held_out
 from mocoflow_core.training.snapshots import read_snapshots
-from tests.toy_training import SAMPLING, SHELL_M
 
 
 @pytest.fixture
@@ -49,8 +48,8 @@ def test_blocks_are_kept_out_of_training_where_no_frame_is(prepared, nothing_hel
     kept_out = drawn.mask(nothing_held_out)
     assert 16 <= kept_out.sum() <= 64
     assert "no frame is held out" in drawn.description
-    pixels = TrainingPixels(prepared.clip, prepared.motion.body, SHELL_M)
-    fewer = TrainingPixels(prepared.clip, prepared.motion.body, SHELL_M, drawn)
+    pixels = TrainingPixels(prepared.clip, prepared.scene())
+    fewer = TrainingPixels(prepared.clip, prepared.scene(), drawn)
     training = kept_out[~prepared.clip.held_out]
 
     def marked(some: TrainingPixels) -> np.ndarray:
@@ -84,11 +83,9 @@ def test_the_score_is_that_of_the_same_pixels_of_a_rendered_view(prepared, train
 def test_scoring_draws_no_random_numbers_and_changes_no_weight(prepared):
     field = prepared.field()
     drawn = draw_held_out(prepared.clip, 100)
-    score = HeldOutScore.prepare(
-        prepared.clip, drawn, prepared.motion, prepared.shape, field, SAMPLING
-    )
+    score = HeldOutScore.prepare(prepared.clip, drawn, prepared.space, field)
     state, weights = torch.get_rng_state(), [p.clone() for p in field.parameters()]
-    assert score(field) == score(field)
+    assert score() == score()
     assert torch.equal(torch.get_rng_state(), state)
     assert all(map(torch.equal, weights, field.parameters()))
     assert all(p.grad is None for p in field.parameters())

@@ -3,11 +3,10 @@ from __future__ import annotations
 import pytest
 import torch
 
-from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.training.batches import TrainingPixels
-from mocoflow_core.training.objective import Objective
-from tests.toy_training import SAMPLING, SHELL_M, Prepared
+from mocoflow_core.training.objective import ShellObjective
+from tests.toy_training import Prepared
 
 
 def terms_and_gradients(prepared: Prepared, losses: LossConfig, disagree: bool = True):
@@ -16,11 +15,10 @@ def terms_and_gradients(prepared: Prepared, losses: LossConfig, disagree: bool =
     if disagree:
         with torch.no_grad():
             field.motion.residual_to_observed.network[-1].bias[3] = 0.02
-    pixels = TrainingPixels(prepared.clip, prepared.motion.body, SHELL_M)
+    pixels = TrainingPixels(prepared.clip, prepared.scene())
     generator = torch.Generator().manual_seed(0)
     batch = pixels.batch(200, 4, generator)
-    moments = Moments(prepared.motion.body, field.motion.codes)
-    objective = Objective(field, moments, losses, SAMPLING, SHELL_M, motion_learned=True)
+    objective = ShellObjective(prepared.scene(field), losses, motion_learned=True)
     return field, objective(batch, generator)
 
 

@@ -17,7 +17,7 @@ from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training import loop
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.guard import TrainingDiverged
-from mocoflow_core.training.optimise_scene import Learned
+from mocoflow_core.training.problem import Learned
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import read_snapshots, snapshot_weights
 from tests.toy_training import SCHEDULE, Prepared, train

@@ -9,15 +9,14 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from mocoflow_core.fields.motion_hybrid import Moments
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.training.batches import TrainingPixels
-from mocoflow_core.training.clock import Seconds, TrainingClock
-from mocoflow_core.training.objective import Objective
-from mocoflow_core.training.ranks import ALONE, FirstRankFailed, Ranks, SeveralRanks
+from mocoflow_core.training.clock import TrainingClock
+from mocoflow_core.training.objective import ShellObjective
+from mocoflow_core.training.ranks import ALONE, Ranks, SeveralRanks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import read_snapshots
-from tests.toy_training import SAMPLING, SCHEDULE, SHELL_M, Prepared, prepare, train
+from tests.toy_training import SCHEDULE, Prepared, prepare, train
 from tests.training.slow_clock import SlowClock
 
 LOSSES = LossConfig(consensus_points=40)
@@ -45,7 +44,7 @@ def test_every_ray_is_one_rank_s_and_shares_are_even(whole, count):
 @pytest.mark.parametrize("count", [2, 3])
 def test_the_ranks_batches_are_the_parts_of_one(prepared, count):
     def batch(ranks: Ranks):
-        pixels = TrainingPixels(prepared.clip, prepared.motion.body, SHELL_M, None, ranks)
+        pixels = TrainingPixels(prepared.clip, prepared.scene(), None, ranks)
         return pixels.batch(50, 4, torch.Generator().manual_seed(0))
 
     whole, parts = batch(ALONE), [batch(Share(rank, count)) for rank in range(count)]
@@ -63,16 +62,16 @@ def gradients(prepared: Prepared, rays: int, ranks: Ranks, empty: bool = False):
         for weight in field.parameters():
             if not weight.any():
                 weight.add_(0.02)
-    pixels = TrainingPixels(prepared.clip, prepared.motion.body, SHELL_M, None, ranks)
+    scene = prepared.scene(field)
+    pixels = TrainingPixels(prepared.clip, scene, None, ranks)
     generator = torch.Generator().manual_seed(0)
     batch = pixels.batch(rays, 4, generator)
     if empty:
         # The second half of all rays meets nothing.
         gone = torch.arange(rays)[ranks.part(rays)] >= rays // 2
         batch = replace(batch, far=torch.where(gone, batch.near, batch.far))
-    moments = Moments(prepared.motion.body, field.motion.codes)
-    objective = Objective(field, moments, LOSSES, SAMPLING, SHELL_M, True, ranks)
-    terms = ranks.wrap(objective)(batch, generator)
+    losses_of = ranks.share(field, ShellObjective(scene, LOSSES, True, ranks))
+    terms = losses_of(batch, generator)
     (torch.stack(list(terms.values())).sum() * ranks.count).backward()
     losses = {name: float(ranks.total(value.detach())) for name, value in terms.items()}
     found = {n: p.grad.numpy() for n, p in field.named_parameters() if p.grad is not None}
@@ -83,9 +82,7 @@ def gradients_here(scene: Path, rays: int, empty: bool):
     return gradients(here(scene), rays, SeveralRanks(), empty)
 
 
-@pytest.mark.parametrize(
-    ("rays", "empty"), [(200, False), (201, False), (200, True), (1, False)]
-)
+@pytest.mark.parametrize(("rays", "empty"), [(200, False), (201, False), (200, True), (1, False)])
 def test_losses_and_gradients_are_those_of_one_process_with_all_rays(
     two_ranks, prepared, toy_folder, rays, empty
 ):
