@@ -28,7 +28,7 @@ from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene, unwatched
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
-from mocoflow_core.training.problem import Learned, shell_problem
+from mocoflow_core.training.problem import Learned, Problem, shell_problem
 from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot
@@ -91,6 +91,24 @@ def prepare(scene: Path) -> Prepared:
     return Prepared(clip, meshes, density, motion, shape)
 
 
+def problem_of(
+    prepared: Prepared,
+    seed: int = 0,
+    learned: Learned | None = None,
+    losses: LossConfig | None = None,
+    ranks: Ranks = ALONE,
+) -> Problem:
+    return shell_problem(
+        prepared.density,
+        prepared.motion,
+        prepared.shape,
+        learned or Learned(),
+        losses or LossConfig(consensus_points=32),
+        seed,
+        ranks,
+    )
+
+
 def train(
     prepared: Prepared,
     workspace: Path,
@@ -102,20 +120,10 @@ def train(
     before: Seconds | None = None,
     watch: Callable[[list[Snapshot]], None] = unwatched,
     clock: TrainingClock | None = None,
-    ranks: Ranks = ALONE,
 ) -> OptimisationResult:
-    problem = shell_problem(
-        prepared.density,
-        prepared.motion,
-        prepared.shape,
-        learned or Learned(),
-        losses or LossConfig(consensus_points=32),
-        seed,
-        ranks,
-    )
     return optimise_scene(
         prepared.clip,
-        problem,
+        problem_of(prepared, seed, learned, losses),
         schedule,
         seed,
         before or Seconds(),

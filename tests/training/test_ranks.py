@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import hashlib
+from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
@@ -9,14 +11,17 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
+from mocoflow_core.errors import InputError
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.training.batches import TrainingPixels
-from mocoflow_core.training.clock import TrainingClock
+from mocoflow_core.training.clock import Seconds, TrainingClock
+from mocoflow_core.training.guard import TrainingDiverged
 from mocoflow_core.training.objective import ShellObjective
-from mocoflow_core.training.ranks import ALONE, Ranks, SeveralRanks
+from mocoflow_core.training.optimise_scene import optimise_scene
+from mocoflow_core.training.ranks import ALONE, FirstRankFailed, Ranks, SeveralRanks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import read_snapshots
-from tests.toy_training import SCHEDULE, Prepared, prepare, train
+from tests.toy_training import SCHEDULE, Prepared, prepare, problem_of, silent, train
 from tests.training.slow_clock import SlowClock
 
 LOSSES = LossConfig(consensus_points=40)
@@ -100,38 +105,196 @@ def train_here(
     workspace: Path,
     schedule: ScheduleConfig = SCHEDULE,
     seconds_per_look: tuple[float, float] | None = None,
-    spoilt_by: int | None = None,
+    spoilt: int | None = None,
 ):
-    """Train as one of two ranks; the second one is given a folder of its own."""
+    """Train as one of two ranks: the result, and what its weights add up to.
+
+    The second rank is given a folder of its own, and a spoilt one brings colours that are none.
+    """
     prepared, ranks = here(scene), SeveralRanks()
     clock = TrainingClock()
     if seconds_per_look:
         clock = TrainingClock(now=SlowClock(per_look=seconds_per_look[ranks.rank]))
-    if ranks.rank == spoilt_by:
-        controls = prepared.motion
-        frames = np.array(prepared.clip.frames, np.float32)
-        frames[:] = np.nan
-        prepared = replace(prepared, clip=replace(prepared.clip, frames=frames), motion=controls)
+    problem = problem_of(prepared, losses=LOSSES, ranks=ranks)
+    clip = prepared.clip
+    if ranks.rank == spoilt:
+        clip = replace(clip, frames=np.full(clip.frames.shape, np.nan, np.float32))
     folder = workspace if ranks.is_first else workspace.with_name("second")
-    result = train(prepared, folder, schedule=schedule, losses=LOSSES, clock=clock, ranks=ranks)
-    return asdict(result)
+    result = optimise_scene(clip, problem, schedule, 0, Seconds(), folder, silent, clock=clock)
+    return asdict(result), digest(problem.field.state_dict())
+
+
+def digest(weights: dict[str, torch.Tensor]) -> str:
+    content = b"".join(weights[name].numpy().tobytes() for name in sorted(weights))
+    return hashlib.sha256(content).hexdigest()
 
 
 def parameters(folder: Path) -> dict[str, torch.Tensor]:
     return load_file(folder / "model.safetensors")
 
 
-def test_two_ranks_end_with_the_losses_and_score_of_one(two_ranks, prepared, toy_folder, tmp_path):
-    alone = train(prepared, tmp_path / "alone", losses=LOSSES)
-    first, second = two_ranks(train_here, toy_folder, tmp_path / "joint")
+def assert_near(found: Path, expected: Path, start: dict[str, torch.Tensor]) -> None:
+    """Both runs went the same way: they are apart by little of what either has gone."""
+    ours, theirs = parameters(found), parameters(expected)
+    for name, value in theirs.items():
+        gone, apart = (value - start[name]).norm(), (ours[name] - value).norm()
+        assert apart <= 0.02 * gone, (name, float(apart), float(gone))
+
+
+@pytest.fixture(scope="module")
+def alone(prepared, tmp_path_factory):
+    """A run of one process, and its result."""
+    folder = tmp_path_factory.mktemp("alone") / "run"
+    return folder, asdict(train(prepared, folder, losses=LOSSES))
+
+
+@pytest.fixture(scope="module")
+def joint(two_ranks, toy_folder, tmp_path_factory):
+    """The same run of two ranks, and what each gave back."""
+    folder = tmp_path_factory.mktemp("joint") / "run"
+    return folder, two_ranks(train_here, toy_folder, folder)
+
+
+def test_all_ranks_end_with_the_same_weights_and_result(joint):
+    folder, (first, second) = joint
     assert first == second
-    assert first["steps"] == alone.steps == SCHEDULE.joint_steps
-    assert first["losses"] == pytest.approx(alone.losses, rel=1e-3)
-    assert first["train_psnr"] == pytest.approx(alone.train_psnr, abs=0.02)
+    assert digest(parameters(folder)) == first[1]
 
 
-def test_only_the_first_rank_writes(two_ranks, toy_folder, tmp_path):
-    two_ranks(train_here, toy_folder, tmp_path / "joint", CAREFUL)
-    assert (tmp_path / "joint" / "model.safetensors").exists()
-    assert len(read_snapshots(tmp_path / "joint")) >= 1
-    assert not (tmp_path / "second").exists()
+def test_two_ranks_end_where_one_process_ends_after_as_many_steps(prepared, alone, joint):
+    (one, expected), (two, ((found, _), _)) = alone, joint
+    assert found["steps"] == expected["steps"] == SCHEDULE.joint_steps
+    assert found["rays"] == expected["rays"] == SCHEDULE.rays
+    assert found["losses"] == pytest.approx(expected["losses"], rel=1e-3)
+    assert found["train_psnr"] == pytest.approx(expected["train_psnr"], abs=0.01)
+    assert_near(two, one, prepared.field().state_dict())
+
+
+def test_only_the_first_rank_writes(joint):
+    folder, _ = joint
+    assert len(read_snapshots(folder)) >= 1
+    assert not folder.with_name("second").exists()
+
+
+def test_the_first_rank_s_clock_decides_for_all(two_ranks, toy_folder, tmp_path):
+    # 50 ms a step on the first rank; the second one, asked alone, would stop after three steps.
+    schedule = SCHEDULE.model_copy(update={"coarse_steps": 1000, "budget_s": 2.0})
+    first, second = two_ranks(train_here, toy_folder, tmp_path / "run", schedule, (0.05, 0.5))
+    assert first == second
+    assert 25 < first[0]["steps"] <= 40
+    assert first[0]["wall_s"] == pytest.approx(2.0, abs=0.1)
+    # CPU seconds of both, twice their walls.
+    assert first[0]["cpu_s"] == pytest.approx(2.0 * 11.0 * first[0]["wall_s"], rel=0.05)
+
+
+def test_a_score_that_the_first_rank_sees_reached_stops_all(two_ranks, toy_folder, joint, tmp_path):
+    target = joint[1][0][0]["train_psnr"] - 1.0
+    schedule = SCHEDULE.model_copy(update={"until_train_psnr": target, "until_every": 5})
+    first, second = two_ranks(train_here, toy_folder, tmp_path / "run", schedule)
+    assert first == second
+    assert first[0]["steps"] < SCHEDULE.joint_steps
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_what_one_rank_meets_all_refuse_and_stop_in_words(two_ranks, toy_folder, tmp_path, rank):
+    with pytest.raises(TrainingDiverged, match=r"frame \d+ has colours"):
+        two_ranks(train_here, toy_folder, tmp_path / "run", SCHEDULE, None, rank)
+    assert not (tmp_path / "run" / "model.safetensors").exists()
+
+
+def killed_here(scene: Path, workspace: Path) -> None:
+    """Train as one of two ranks until the tenth step, with a checkpoint of each."""
+    prepared, ranks = here(scene), SeveralRanks()
+
+    def killed(fraction: float, text: str) -> None:
+        raise KeyboardInterrupt
+
+    problem = problem_of(prepared, losses=LOSSES, ranks=ranks)
+    with suppress(KeyboardInterrupt):
+        optimise_scene(prepared.clip, problem, CAREFUL, 0, Seconds(), workspace, killed)
+
+
+def killed_alone(prepared: Prepared, workspace: Path) -> None:
+    def killed(fraction: float, text: str) -> None:
+        raise KeyboardInterrupt
+
+    with suppress(KeyboardInterrupt):
+        train(prepared, workspace, schedule=CAREFUL, losses=LOSSES, progress=killed)
+
+
+def test_a_checkpoint_of_two_ranks_is_gone_on_from_by_two(two_ranks, toy_folder, joint, tmp_path):
+    two_ranks(killed_here, toy_folder, tmp_path / "run")
+    (result, weights), _ = two_ranks(train_here, toy_folder, tmp_path / "run")
+    assert result["tries"] == 2
+    assert weights == joint[1][0][1]
+
+
+def test_a_checkpoint_of_two_ranks_is_gone_on_from_by_one(
+    two_ranks, prepared, toy_folder, alone, tmp_path
+):
+    two_ranks(killed_here, toy_folder, tmp_path / "run")
+    assert train(prepared, tmp_path / "run", losses=LOSSES).tries == 2
+    assert_near(tmp_path / "run", alone[0], prepared.field().state_dict())
+
+
+def test_a_checkpoint_of_one_is_gone_on_from_by_two(
+    two_ranks, prepared, toy_folder, alone, tmp_path
+):
+    killed_alone(prepared, tmp_path / "run")
+    # Only the first rank sees the folder.
+    (result, _), second = two_ranks(train_here, toy_folder, tmp_path / "run")
+    assert result["tries"] == second[0]["tries"] == 2
+    assert_near(tmp_path / "run", alone[0], prepared.field().state_dict())
+
+
+def test_a_checkpoint_of_other_settings_is_refused_by_all(
+    two_ranks, prepared, toy_folder, tmp_path
+):
+    killed_alone(prepared, tmp_path / "run")
+    before = sorted((tmp_path / "run").iterdir())
+    with pytest.raises(InputError, match=r"schedule\.rays = 48, got a run with 50"):
+        two_ranks(
+            train_here, toy_folder, tmp_path / "run", SCHEDULE.model_copy(update={"rays": 50})
+        )
+    assert sorted((tmp_path / "run").iterdir()) == before
+
+
+def failing_here() -> str:
+    def failing() -> str:
+        raise OSError("the disk is gone")
+
+    try:
+        return SeveralRanks().first(failing)
+    except OSError as error:
+        return f"first: {error}"
+    except FirstRankFailed:
+        return "told"
+
+
+def test_a_failure_of_the_first_rank_reaches_those_that_wait_for_it(two_ranks):
+    assert two_ranks(failing_here) == ["first: the disk is gone", "told"]
+
+
+def agreements_here():
+    ranks = SeveralRanks()
+    return (
+        ranks.first(lambda: {"rank": ranks.rank, "none": None}),
+        ranks.first_bytes(lambda: bytes(range(256)) * 300),
+        ranks.said("first" if ranks.rank == 0 else None),
+        ranks.said("second" if ranks.rank == 1 else None),
+        ranks.said(None),
+        ranks.before(3 + 2 * ranks.rank),
+        float(ranks.total(torch.tensor(1.0 + ranks.rank))),
+        ranks.seconds(Seconds(1.0 + ranks.rank, 10.0 + ranks.rank)),
+    )
+
+
+def test_all_ranks_agree(two_ranks):
+    first, second = two_ranks(agreements_here)
+    assert first[5] == (0, 8)
+    assert second[5] == (3, 8)
+    for agreed in (first, second):
+        assert agreed[0] == {"rank": 0, "none": None}
+        assert agreed[1] == bytes(range(256)) * 300
+        assert agreed[2:5] == ("first", "second", None)
+        assert agreed[6:] == (3.0, Seconds(1.0, 21.0))
