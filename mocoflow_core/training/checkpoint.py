@@ -94,6 +94,12 @@ def read_checkpoint(folder: Path) -> bytes:
     return path.read_bytes() if path.is_file() else b""
 
 
+def elapsed_at_checkpoint(folder: Path) -> Seconds:
+    """What the training clock showed at a folder's checkpoint; nothing where there is none."""
+    content = read_checkpoint(folder)
+    return Progress.from_json(_metadata(content)["progress"]).elapsed if content else Seconds()
+
+
 def restore_checkpoint(
     content: bytes,
     folder: Path,

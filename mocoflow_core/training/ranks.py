@@ -8,8 +8,11 @@ sums over ranks, and whatever is decided is decided on joint values or by the fi
 from __future__ import annotations
 
 import json
+import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -100,9 +103,19 @@ class SeveralRanks(Ranks):
     Decisions travel as CPU tensors, gradients on the device that the weights lie on.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, leads: bool = True) -> None:
+        """Args: leads: the first rank is the lowest one that does; one at least must."""
         self.rank = process_group.get_rank()
         self.count = process_group.get_world_size()
+        leader = torch.tensor(self.rank if leads else self.count)
+        process_group.all_reduce(leader, process_group.ReduceOp.MIN)
+        self._leader = int(leader)
+        if self._leader == self.count:
+            raise RuntimeError("none of these machines leads: the run itself is not among them")
+
+    @property
+    def is_first(self) -> bool:
+        return self.rank == self._leader
 
     def share(self, model: nn.Module, losses: Losses) -> Losses:
         with warnings.catch_warnings():
@@ -146,12 +159,37 @@ class SeveralRanks(Ranks):
             try:
                 done = b"+" + work()
             except BaseException:
-                _broadcast(b"-", 0)
+                _broadcast(b"-", self._leader)
                 raise
-        done = _broadcast(done, 0)
+        done = _broadcast(done, self._leader)
         if not done.startswith(b"+"):
             raise FirstRankFailed("the first rank failed; its own words say why")
         return done[1:]
+
+
+@contextmanager
+def process_group_of(meeting: Path | None) -> Iterator[None]:
+    """Be one of the processes that torch's elastic launcher started, while they last.
+
+    Gradients travel over NCCL where there are GPUs, everything else over gloo.
+
+    Args:
+        meeting: file beside which all ranks find each other; None: where the launchers met.
+    """
+    number, count = int(os.environ["RANK"]), int(os.environ["WORLD_SIZE"])
+    backend = "cpu:gloo,cuda:nccl" if torch.cuda.is_available() else "gloo"
+    if torch.cuda.is_available():
+        torch.cuda.set_device(int(os.environ["LOCAL_RANK"]))
+    store = None
+    if meeting is not None:
+        # Each start meets anew.
+        file = meeting.with_suffix(f".{os.environ['TORCHELASTIC_RESTART_COUNT']}")
+        store = process_group.FileStore(str(file), count)
+    process_group.init_process_group(backend, store=store, rank=number, world_size=count)
+    try:
+        yield
+    finally:
+        process_group.destroy_process_group()
 
 
 def _broadcast(content: bytes, source: int) -> bytes:
