@@ -40,6 +40,10 @@ Score = Callable[[], float]
 Chosen = TypeVar("Chosen", int, int | None)
 
 
+def unreported(share: float, text: str) -> None:
+    """The first rank reports for all."""
+
+
 class TrainingRun:
     """One optimisation, started or resumed.
 
@@ -71,7 +75,7 @@ class TrainingRun:
         self.schedule = schedule
         self.before = before
         self.workspace = workspace
-        self.report = progress
+        self.report = progress if ranks.is_first else unreported
         self.watch = watch
         self.score = score
         self.clock = clock

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -34,7 +35,9 @@ class Teller:
 
 
 def _tell(message: dict[str, JsonValue]) -> None:
-    print(_MARK + json.dumps(message), flush=True)
+    # In one write, as the ranks share their output: nobody's words come between.
+    sys.stdout.write(f"\n{_MARK}{json.dumps(message)}\n")
+    sys.stdout.flush()
 
 
 class Listener:
@@ -54,11 +57,11 @@ class Listener:
         self.failure: InputError | TrainingDiverged | None = None
 
     def hear(self, line: str) -> None:
-        before, mark, message = line.partition(_MARK)
-        if before or not mark:
-            self._log(before or line)
+        _, mark, message = line.partition(_MARK)
         if mark:
             self._understand(json.loads(message))
+        elif line:
+            self._log(line)
 
     def _understand(self, message: dict[str, JsonValue]) -> None:
         match message:
