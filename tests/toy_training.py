@@ -36,6 +36,7 @@ from mocoflow_core.training.snapshots import Snapshot
 SHELL_M = 0.06
 MOTION = MotionConfig(residual=ResidualConfig(hidden=16))
 SAMPLING = SamplingConfig(step_m=0.03)
+LOSSES = LossConfig(consensus_points=32)
 SCHEDULE = ScheduleConfig(
     coarse_steps=15, fine_steps=10, rays=48, threads=1, checkpoint_every_s=1e6
 )
@@ -103,7 +104,7 @@ def problem_of(
         prepared.motion,
         prepared.shape,
         learned or Learned(),
-        losses or LossConfig(consensus_points=32),
+        losses or LOSSES,
         seed,
         ranks,
     )

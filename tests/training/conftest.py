@@ -18,11 +18,16 @@ def prepared(toy_folder):
 
 
 @pytest.fixture(scope="session")
-def trained(prepared, tmp_path_factory):
+def alone(prepared, tmp_path_factory):
+    """The folder of an undisturbed run of one process, and its result."""
+    folder = tmp_path_factory.mktemp("trained") / "run"
+    return folder, train(prepared, folder)
+
+
+@pytest.fixture(scope="session")
+def trained(alone):
     """The folder of an undisturbed run."""
-    folder = tmp_path_factory.mktemp("trained")
-    train(prepared, folder)
-    return folder
+    return alone[0]
 
 
 @pytest.fixture(scope="session")

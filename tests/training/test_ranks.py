@@ -12,8 +12,7 @@ import torch
 from safetensors.torch import load_file
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.losses.weights import LossConfig
-from mocoflow_core.training.batches import TrainingPixels
+from mocoflow_core.training.batches import Batch, TrainingPixels
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.guard import TrainingDiverged
 from mocoflow_core.training.objective import ShellObjective
@@ -21,10 +20,9 @@ from mocoflow_core.training.optimise_scene import optimise_scene
 from mocoflow_core.training.ranks import ALONE, FirstRankFailed, Ranks, SeveralRanks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import read_snapshots
-from tests.toy_training import SCHEDULE, Prepared, prepare, problem_of, silent, train
+from tests.toy_training import LOSSES, SCHEDULE, Prepared, prepare, problem_of, silent, train
 from tests.training.slow_clock import SlowClock
 
-LOSSES = LossConfig(consensus_points=40)
 CAREFUL = SCHEDULE.model_copy(update={"checkpoint_every_s": 1e-9})
 
 here = cache(prepare)  # a rank prepares a scene once
@@ -115,7 +113,7 @@ def train_here(
     clock = TrainingClock()
     if seconds_per_look:
         clock = TrainingClock(now=SlowClock(per_look=seconds_per_look[ranks.rank]))
-    problem = problem_of(prepared, losses=LOSSES, ranks=ranks)
+    problem = problem_of(prepared, ranks=ranks)
     clip = prepared.clip
     if ranks.rank == spoilt:
         clip = replace(clip, frames=np.full(clip.frames.shape, np.nan, np.float32))
@@ -142,13 +140,6 @@ def assert_near(found: Path, expected: Path, start: dict[str, torch.Tensor]) -> 
 
 
 @pytest.fixture(scope="module")
-def alone(prepared, tmp_path_factory):
-    """A run of one process, and its result."""
-    folder = tmp_path_factory.mktemp("alone") / "run"
-    return folder, asdict(train(prepared, folder, losses=LOSSES))
-
-
-@pytest.fixture(scope="module")
 def joint(two_ranks, toy_folder, tmp_path_factory):
     """The same run of two ranks, and what each gave back."""
     folder = tmp_path_factory.mktemp("joint") / "run"
@@ -163,10 +154,10 @@ def test_all_ranks_end_with_the_same_weights_and_result(joint):
 
 def test_two_ranks_end_where_one_process_ends_after_as_many_steps(prepared, alone, joint):
     (one, expected), (two, ((found, _), _)) = alone, joint
-    assert found["steps"] == expected["steps"] == SCHEDULE.joint_steps
-    assert found["rays"] == expected["rays"] == SCHEDULE.rays
-    assert found["losses"] == pytest.approx(expected["losses"], rel=1e-3)
-    assert found["train_psnr"] == pytest.approx(expected["train_psnr"], abs=0.01)
+    assert found["steps"] == expected.steps == SCHEDULE.joint_steps
+    assert found["rays"] == expected.rays == SCHEDULE.rays
+    assert found["losses"] == pytest.approx(expected.losses, rel=1e-3)
+    assert found["train_psnr"] == pytest.approx(expected.train_psnr, abs=0.01)
     assert_near(two, one, prepared.field().state_dict())
 
 
@@ -204,14 +195,18 @@ def test_what_one_rank_meets_all_refuse_and_stop_in_words(two_ranks, toy_folder,
 
 def killed_here(scene: Path, workspace: Path) -> None:
     """Train as one of two ranks until the tenth step, with a checkpoint of each."""
-    prepared, ranks = here(scene), SeveralRanks()
+    prepared = here(scene)
+    problem = problem_of(prepared, ranks=SeveralRanks())
+    losses_of, calls = problem.objective, iter(range(11))  # the first one tells the start's losses
 
-    def killed(fraction: float, text: str) -> None:
-        raise KeyboardInterrupt
+    def killed(batch: Batch, generator: torch.Generator) -> dict[str, torch.Tensor]:
+        if next(calls, None) is None:
+            raise KeyboardInterrupt
+        return losses_of(batch, generator)
 
-    problem = problem_of(prepared, losses=LOSSES, ranks=ranks)
+    problem = replace(problem, objective=killed)
     with suppress(KeyboardInterrupt):
-        optimise_scene(prepared.clip, problem, CAREFUL, 0, Seconds(), workspace, killed)
+        optimise_scene(prepared.clip, problem, CAREFUL, 0, Seconds(), workspace, silent)
 
 
 def killed_alone(prepared: Prepared, workspace: Path) -> None:
@@ -219,7 +214,7 @@ def killed_alone(prepared: Prepared, workspace: Path) -> None:
         raise KeyboardInterrupt
 
     with suppress(KeyboardInterrupt):
-        train(prepared, workspace, schedule=CAREFUL, losses=LOSSES, progress=killed)
+        train(prepared, workspace, schedule=CAREFUL, progress=killed)
 
 
 def test_a_checkpoint_of_two_ranks_is_gone_on_from_by_two(two_ranks, toy_folder, joint, tmp_path):
@@ -233,7 +228,7 @@ def test_a_checkpoint_of_two_ranks_is_gone_on_from_by_one(
     two_ranks, prepared, toy_folder, alone, tmp_path
 ):
     two_ranks(killed_here, toy_folder, tmp_path / "run")
-    assert train(prepared, tmp_path / "run", losses=LOSSES).tries == 2
+    assert train(prepared, tmp_path / "run").tries == 2
     assert_near(tmp_path / "run", alone[0], prepared.field().state_dict())
 
 
