@@ -87,7 +87,7 @@ class PreparedScene:
         return optimise_scene(
             self.clip,
             problem,
-            configuration.schedule,
+            configuration.schedule.joint(),
             seed,
             self.spent,
             folder,

@@ -12,6 +12,9 @@ from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
 
+# Written out: the presets themselves take torch, which takes a second.
+PRESET_HELP = "fast, toy, paper, paper_aist or paper_zju_mocap."
+
 app = typer.Typer(
     help="A moving person, filmed by one fixed camera, seen from any side at any time.",
     no_args_is_help=True,
@@ -35,7 +38,7 @@ def main() -> None:
 def reconstruct(
     scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
     out: Annotated[Path | None, typer.Option(help="New folder for the results.")] = None,
-    preset: Annotated[str, typer.Option(help="fast or toy.")] = "fast",
+    preset: Annotated[str, typer.Option(help=PRESET_HELP)] = "fast",
     meshes: Annotated[Path | None, typer.Option(help="Body meshes to use instead.")] = None,
     seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
     budget: Annotated[
@@ -89,7 +92,7 @@ def reconstruct(
 @app.command()
 def plan(
     scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
-    preset: Annotated[str, typer.Option(help="fast or toy.")] = "fast",
+    preset: Annotated[str, typer.Option(help=PRESET_HELP)] = "fast",
     meshes: Annotated[Path | None, typer.Option(help="Body meshes to use instead.")] = None,
     settings: Annotated[
         list[str] | None,

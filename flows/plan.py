@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 from prefect import flow
 
@@ -11,12 +10,13 @@ from flows.plan_table import show_plan
 from flows.preparation import prepare
 from flows.request import Request
 from mocoflow_core.planning.plan import ScenePlan
+from mocoflow_core.presets import Preset
 
 
 @flow(name="plan", validate_parameters=True)
 def plan(
     scene: Path,
-    preset: Literal["fast", "toy"] = "fast",
+    preset: Preset = "fast",
     meshes: Path | None = None,
     settings: tuple[str, ...] = (),
     store: str | None = None,

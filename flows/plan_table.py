@@ -35,9 +35,10 @@ def print_plan(plan: ScenePlan, console: Console) -> None:
         decisions = [decision for decision in plan.decisions if decision.part == part]
         if decisions:
             console.print(_table(part, decisions))
+    shell = f"Shell of {1000 * plan.shell_width_m:.0f} mm around the body, canonical"
     console.print(
-        f"Shell of {1000 * plan.shell_width_m:.0f} mm around the body, canonical frame "
-        f"{plan.canonical_frame}, {100 * plan.unseen_share:.0f} % of the surface never seen."
+        f"{shell if plan.shell_width_m else 'Canonical'} frame {plan.canonical_frame}, "
+        f"{100 * plan.unseen_share:.0f} % of the surface never seen."
     )
 
 

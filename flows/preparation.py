@@ -18,12 +18,12 @@ from mocoflow_core.artifacts import (
 )
 from mocoflow_core.capture.extract import ClipNeeds
 from tasks.extract_clip import extract_clip
-from tasks.fit_motion import fit_motion
+from tasks.fit_motion import fit_motion, fit_networks
 from tasks.ingest_meshes import ingest_meshes
 from tasks.inspect_scene import inspect_scene
 from tasks.locate_body import locate_body
 from tasks.plan_scene import plan_scene
-from tasks.pretrain_density import pretrain_density
+from tasks.pretrain_density import pretrain_density, pretrain_networks
 from tasks.repair_body import repair_body
 
 
@@ -60,7 +60,38 @@ def prepare(request: Request) -> Preparation:
     if inspection.holds("location_search"):
         bodies = locate_body(where, clip, given, chosen.location)
     repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
-    plan = plan_scene(where, clip, repaired, inspection, chosen.plan)
-    density = pretrain_density(where, repaired, plan, chosen.density)
-    motion = fit_motion(where, clip, repaired, plan, density, chosen.motion)
+    plan = plan_scene(where, clip, repaired, inspection, chosen.plan, chosen.representation)
+    start = _start_networks if chosen.representation == "networks" else _start_hybrid
+    density, motion = start(request, clip, repaired, plan)
     return Preparation(given, inspection, clip, bodies, repaired, plan, density, motion)
+
+
+def _start_hybrid(
+    request: Request, clip: ClipArtifact, bodies: RepairArtifact, plan: PlanArtifact
+) -> tuple[DensityArtifact, MotionArtifact]:
+    """Density and motion of the fast representation: measured on the mesh."""
+    where, chosen = request.store, request.configuration
+    density = pretrain_density(where, bodies, plan, chosen.density)
+    return density, fit_motion(where, clip, bodies, plan, density, chosen.motion)
+
+
+def _start_networks(
+    request: Request, clip: ClipArtifact, bodies: RepairArtifact, plan: PlanArtifact
+) -> tuple[DensityArtifact, MotionArtifact]:
+    """Density and motion of the paper's networks: trained on the mesh."""
+    where, chosen, seed = request.store, request.configuration, request.seed
+    density = pretrain_networks(
+        where,
+        clip,
+        bodies,
+        plan,
+        chosen.networks,
+        chosen.box,
+        chosen.mesh_views,
+        chosen.schedule.pretraining(),
+        seed,
+    )
+    fitted = fit_networks(
+        where, clip, bodies, plan, density, chosen.losses, chosen.schedule.fitting(), seed
+    )
+    return density, fitted

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
-from typing import Literal
 
 from prefect import flow
 
+from flows.optimisation import optimise
 from flows.plan_table import show_plan
 from flows.preparation import prepare
 from flows.request import Request
 from flows.run_facts import describe_run, records, show_in_prefect
 from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunRecord
+from mocoflow_core.presets import Preset
 from tasks.extract_evaluation import extract_evaluation
-from tasks.optimise_scene import optimise_scene
 from tasks.render_views import render_views
 from tasks.score_views import score_views
 from tasks.stage import Aside
@@ -27,7 +27,7 @@ from tasks.write_report import write_report
 def reconstruct(
     scene: Path,
     out: Path,
-    preset: Literal["fast", "toy"] = "fast",
+    preset: Preset = "fast",
     meshes: Path | None = None,
     seed: int = 0,
     budget_s: float | None = None,
@@ -65,20 +65,7 @@ def reconstruct(
     prepared = prepare(request)
     show_plan(request, prepared.plan)
     clip, plan, bodies = prepared.clip, prepared.plan, prepared.bodies
-    trained = optimise_scene(
-        where,
-        clip,
-        plan,
-        prepared.density,
-        prepared.motion,
-        spent_on(prepared.stages, machine),
-        chosen.canonical,
-        chosen.motion,
-        chosen.sampling,
-        chosen.losses,
-        chosen.schedule,
-        seed,
-    )
+    trained = optimise(request, prepared, spent_on(prepared.stages, machine))
 
     evaluation = extract_evaluation(where, request.others, clip, chosen.capture)
     views = render_views(

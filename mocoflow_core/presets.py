@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 from mocoflow_core.body.location import LocationConfig
 from mocoflow_core.body.repair import RepairConfig
@@ -10,13 +11,17 @@ from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
+from mocoflow_core.fields.network_field import NetworksConfig
 from mocoflow_core.fields.scene_shape import MotionConfig
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.methods.presentation import PresentationConfig
 from mocoflow_core.methods.truth_errors import TruthConfig
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.planning.configuration import PlanConfig
+from mocoflow_core.planning.plan import Representation
+from mocoflow_core.rendering.frame_box import BoxConfig
 from mocoflow_core.rendering.sampling import SamplingConfig
+from mocoflow_core.training.mesh_views import MeshViewsConfig
 from mocoflow_core.training.pretrain_density import DensityConfig
 from mocoflow_core.training.schedule import ScheduleConfig
 
@@ -24,6 +29,7 @@ from mocoflow_core.training.schedule import ScheduleConfig
 class Configuration(ConfigurationPart):
     """Everything that can be set, by stage."""
 
+    representation: Representation = "hybrid"
     capture: CaptureConfig = CaptureConfig()
     location: LocationConfig = LocationConfig()
     repair: RepairConfig = RepairConfig()
@@ -32,6 +38,9 @@ class Configuration(ConfigurationPart):
     motion: MotionConfig = MotionConfig()
     canonical: CanonicalConfig = CanonicalConfig()
     sampling: SamplingConfig = SamplingConfig()
+    networks: NetworksConfig = NetworksConfig()
+    box: BoxConfig = BoxConfig()
+    mesh_views: MeshViewsConfig = MeshViewsConfig()
     losses: LossConfig = LossConfig()
     schedule: ScheduleConfig = ScheduleConfig()
     evaluation: EvaluationConfig = EvaluationConfig()
@@ -56,4 +65,54 @@ def toy() -> Configuration:
     )
 
 
-PRESETS: dict[str, Callable[[], Configuration]] = {"fast": fast, "toy": toy}
+def paper() -> Configuration:
+    """The paper's networks, losses, sampling, stages and schedule (as for People-Snapshot).
+
+    ``schedule.scale`` shrinks all counts of steps in proportion.
+    """
+    return Configuration(
+        representation="networks",
+        plan=PlanConfig(body_repair="off", canonical_frame="first"),
+        losses=LossConfig(silhouette_weight=0.0, consensus_points=None),
+        schedule=ScheduleConfig(
+            pretrain_steps=200_000,
+            fit_steps=200_000,
+            coarse_steps=1_500_000,
+            fine_steps=1_000_000,
+            rays=384,
+            frames_per_step=1,
+            rate_networks=5e-4,
+            rate_motion=5e-4,
+            adam_beta2=0.999,
+            adam_epsilon=1e-8,
+        ),
+    )
+
+
+def paper_aist() -> Configuration:
+    """The paper's schedule for AIST."""
+    return _with_steps(500_000, 1_500_000, 1_000_000)
+
+
+def paper_zju_mocap() -> Configuration:
+    """The paper's schedule for ZJU-MoCap."""
+    return _with_steps(800_000, 2_000_000, 1_500_000)
+
+
+def _with_steps(fit: int, coarse: int, fine: int) -> Configuration:
+    """The paper's configuration with other (N1, N2, N3)."""
+    chosen = paper()
+    steps = {"fit_steps": fit, "coarse_steps": coarse, "fine_steps": fine}
+    schedule = chosen.schedule.model_copy(update=steps)
+    return chosen.model_copy(update={"schedule": schedule})
+
+
+Preset = Literal["fast", "toy", "paper", "paper_aist", "paper_zju_mocap"]
+
+PRESETS: dict[str, Callable[[], Configuration]] = {
+    "fast": fast,
+    "toy": toy,
+    "paper": paper,
+    "paper_aist": paper_aist,
+    "paper_zju_mocap": paper_zju_mocap,
+}

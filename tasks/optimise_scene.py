@@ -19,12 +19,15 @@ from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training import optimise_scene as training
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart
-from mocoflow_core.training.problem import Learned, shell_problem
+from mocoflow_core.training.network_stages import network_problem
+from mocoflow_core.training.optimise_scene import OptimisationResult
+from mocoflow_core.training.problem import Learned, Problem, shell_problem
 from mocoflow_core.training.schedule import ScheduleConfig
 from tasks.growing_curve import GrowingCurve
 from tasks.stage import Aside, Stage, Summary, stage
 
 ALGORITHM_VERSION = 2  # Guard of rising losses; held-out pixels; schedules in shares.
+NETWORKS_VERSION = 1  # First version.
 
 
 @stage(SceneArtifact, ALGORITHM_VERSION, resumes=True)
@@ -51,7 +54,6 @@ def optimise_scene(
     decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
     canonical = canonical.model_copy(update={"finest_m": decided.no_finer(canonical.finest_m)})
     sampling = sampling.model_copy(update={"step_m": decided.no_finer(sampling.step_m)})
-    spent = Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
     problem = shell_problem(
         CanonicalDensity.load(work.open(density)),
         MotionStart.load(work.open(motion)),
@@ -73,7 +75,39 @@ def optimise_scene(
         losses,
         seed,
     )
-    result = training.optimise_scene(
+    return _summary(_optimise(work, seen, problem, schedule, seed, before), before)
+
+
+@stage(SceneArtifact, NETWORKS_VERSION, resumes=True)
+def optimise_networks(
+    work: Stage,
+    clip: ClipArtifact,
+    plan: PlanArtifact,
+    fitted: MotionArtifact,
+    before: Aside,
+    losses: LossConfig,
+    schedule: ScheduleConfig,
+    seed: int,
+) -> Summary:
+    """Third stage with the paper's networks, from the weights that fit_motion has left.
+
+    Output: as of the fast representation. Minutes to days.
+    """
+    seen = Clip.load(work.open(clip))
+    decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
+    learned = Learned(
+        consensus=decided.needs("motion_consensus"),
+        appearance_codes=decided.needs("appearance_codes"),
+    )
+    problem = network_problem(work.open(fitted), seen, learned, losses, seed)
+    return _summary(_optimise(work, seen, problem, schedule, seed, before), before)
+
+
+def _optimise(
+    work: Stage, seen: Clip, problem: Problem, schedule: ScheduleConfig, seed: int, before: Aside
+) -> OptimisationResult:
+    spent = _spent(before)
+    return training.optimise_scene(
         seen,
         problem,
         schedule,
@@ -84,6 +118,14 @@ def optimise_scene(
         GrowingCurve(spent).show,
         TrainingClock(paused=work.leave_out),
     )
+
+
+def _spent(before: Aside) -> Seconds:
+    """The training clock at the start."""
+    return Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
+
+
+def _summary(result: OptimisationResult, before: Aside) -> Summary:
     return {
         "steps": result.steps,
         "rays": result.rays,
@@ -95,6 +137,6 @@ def optimise_scene(
         "held_out": result.held_out,
         "warnings": list(result.warnings),
         "machine": before.values["machine"],
-        "before_wall_s": spent.wall,
-        "before_cpu_s": spent.cpu,
+        "before_wall_s": _spent(before).wall,
+        "before_cpu_s": _spent(before).cpu,
     }

@@ -18,7 +18,7 @@ from mocoflow_core.planning.preparation import decide_frames, decide_preparation
 from mocoflow_core.planning.visibility import visibility_warnings
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Shell, detail, repair and repeated frames are decisions.
+ALGORITHM_VERSION = 3  # A representation has decisions of its own.
 
 
 @stage(PlanArtifact, ALGORITHM_VERSION)
@@ -28,6 +28,7 @@ def plan_scene(
     bodies: RepairArtifact,
     inspection: InspectionArtifact,
     plan: PlanConfig,
+    representation: planning.Representation,
 ) -> Summary:
     """Decides from the train side alone; each decision carries its evidence.
 
@@ -39,7 +40,7 @@ def plan_scene(
     seen = Clip.load(work.open(clip))
     frames = decide_frames(clip.summary["repeated"], clip.summary["frames"], plan)
     preparation = (*decide_preparation(found, plan), frames, repair)
-    decided = planning.plan_scene(seen, meshes, preparation, plan)
+    decided = planning.plan_scene(seen, meshes, preparation, plan, representation)
     (work.folder / "plan.json").write_text(decided.model_dump_json(indent=1))
     return {
         "needed": {decision.name: decision.needed for decision in decided.decisions},

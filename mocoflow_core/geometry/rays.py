@@ -25,7 +25,7 @@ class Rays:
         """Points at the given distances (R,) along the rays, (R, 3)."""
         return self.origins + distance_m[:, None] * self.directions
 
-    def select(self, rows: Tensor) -> Rays:
+    def select(self, rows: Tensor | slice) -> Rays:
         return Rays(self.origins[rows], self.directions[rows])
 
 

@@ -23,14 +23,16 @@ def local_consensus(
     to_observed: Move,
     points: Tensor,
     row: Tensor,
+    mapped: tuple[Tensor, Tensor] | None = None,
     in_all: Count = these_alone,
 ) -> Tensor:
     """``|to_observed(to_canonical(x, t_i), t_i) - x|``, L1 over axes, mean over points, metres.
 
-    An empty selection gives exactly 0. Where other processes have points too, their values add
-    up to the mean over all. Source: MoCo-Flow eq. 3.
+    An empty selection gives exactly 0. ``mapped`` is ``to_canonical`` of the points, where the
+    caller has it already. Where other processes have points too, their values add up to the mean
+    over all. Source: MoCo-Flow eq. 3.
     """
-    canonical, known = to_canonical(points, row)
+    canonical, known = mapped or to_canonical(points, row)
     back, known_back = to_observed(canonical, row)
     return _mean_l1(back - points, known & known_back, in_all)
 
@@ -41,6 +43,7 @@ def global_consensus(
     points: Tensor,
     row: Tensor,
     other_row: Tensor,
+    mapped: tuple[Tensor, Tensor] | None = None,
     in_all: Count = these_alone,
 ) -> Tensor:
     """The chain through another moment t_j and back to x; L1 over axes, mean, metres.
@@ -48,7 +51,7 @@ def global_consensus(
     ``to_observed(to_canonical(to_observed(to_canonical(x, t_i), t_j), t_j), t_i) - x``.
     Source: MoCo-Flow eq. 2.
     """
-    canonical, known = to_canonical(points, row)
+    canonical, known = mapped or to_canonical(points, row)
     elsewhere, known_1 = to_observed(canonical, other_row)
     canonical_again, known_2 = to_canonical(elsewhere, other_row)
     back, known_3 = to_observed(canonical_again, row)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.methods.rendered_views import (
     Pictures,
     Progress,
@@ -62,7 +61,7 @@ def score_run(
         for row in score_views(subject, method, views, Pictures(folders.views / method), evaluating)
     ]
     meshes = MeshSequence.load(folders.bodies / "meshes.npz")
-    canonical = CanonicalDensity.load(folders.trained).vertices
+    canonical = renderer.scene.space.canonical_vertices
     truth_file = folders.evaluation / "truth.npz"
     known = truth_file if truth_file.exists() else None
     rows += motion_rows(subject, renderer, clip, meshes, canonical, known, truth)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from mocoflow_core.body.light import LightConfig
@@ -24,6 +26,11 @@ class PlanConfig(ConfigurationPart):
     fixed_light: Force = "auto"
     wide_shell: Force = "auto"
     fine_detail: Force = "auto"
+    initialisation: Force = "auto"
+    adaptive_box: Force = "auto"
+    canonical_frame: Literal["most_spread", "first"] = Field(
+        "most_spread", description="Whose observation space is canonical (paper: the first)."
+    )
     trusted_overlap: float = Field(
         0.6, ge=0, le=1, description="Silhouette overlap from which a given location is trusted."
     )
@@ -40,6 +47,9 @@ class PlanConfig(ConfigurationPart):
     light: LightConfig = LightConfig()
     faint_light: float = Field(
         0.05, ge=0, description="A light that changes brightness by less than this is left out."
+    )
+    tight_box: float = Field(
+        1.2, ge=1, description="A box for the whole clip so much larger than each frame's is tight."
     )
     detail_px: float = Field(
         0.5, gt=0, description="Cells and steps below this part of a pixel show nothing more."

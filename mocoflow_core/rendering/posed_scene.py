@@ -71,6 +71,10 @@ Field = TypeVar("Field", bound=SceneField)
 class Space(Protocol[Field]):
     """What a representation knows of a scene besides the weights: shapes, and the body's place."""
 
+    @property
+    def canonical_vertices(self) -> NDArray[np.float32]:
+        """The mesh at the canonical frame, (V, 3) world metres."""
+
     def build(self) -> Field:
         """Fields with fresh weights, drawn from torch's global generator."""
 

@@ -32,6 +32,10 @@ class ShellSpace:
         self._canonical = canonical_nodes(controls, shape.shell_width_m, shape.motion.body)
         self._bodies: dict[tuple[float, ...], BodyMotion] = {}
 
+    @property
+    def canonical_vertices(self) -> NDArray[np.float32]:
+        return self.density.vertices
+
     def build(self) -> HybridField:
         return self.shape.build(self.density.prior())
 

@@ -14,6 +14,7 @@ from torch import Tensor
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.rays import Rays, pixel_rays
+from mocoflow_core.rendering.box_space import BoxSpace
 from mocoflow_core.rendering.pixels import VisiblePixels
 from mocoflow_core.rendering.posed_scene import PosedScene, RenderedRays, Space
 from mocoflow_core.rendering.shell_space import ShellSpace
@@ -21,7 +22,7 @@ from mocoflow_core.threads import torch_threads
 
 Image = NDArray[np.float32]
 
-SPACES = {"hybrid": ShellSpace}
+SPACES: dict[str, type[ShellSpace] | type[BoxSpace]] = {"hybrid": ShellSpace, "networks": BoxSpace}
 
 
 class TrainedScene:

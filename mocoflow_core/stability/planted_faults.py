@@ -97,6 +97,7 @@ def _in_optimiser(run: TrainingRun, batch: Batch) -> Batch:
 
 def _every_time(run: TrainingRun, batch: Batch) -> Batch:
     """A frame that brings no numbers whenever it is drawn."""
+    assert isinstance(run.pixels, TrainingPixels)
     spoilt = run.pixels.frames.float()
     spoilt[5] = torch.nan
     run.pixels.frames = spoilt

@@ -81,6 +81,7 @@ def _to_double(field: HybridField, objective: ShellObjective) -> None:
 def _in_double(run: TrainingRun) -> None:
     objective = _losses(run)
     _to_double(objective.scene.field, objective)
+    assert isinstance(run.pixels, TrainingPixels)
     run.pixels = DoublePixels(run.pixels)
 
 

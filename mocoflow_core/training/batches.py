@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -13,15 +14,15 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.rays import Rays, pixel_rays
 from mocoflow_core.rendering.posed_scene import PosedScene
 from mocoflow_core.training.held_out import HeldOutPixels
-from mocoflow_core.training.ranks import ALONE, Ranks
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """R rays with what the camera saw along them; this rank's part of a step."""
+    """R rays with what the camera saw along them: all of a step, or one rank's part."""
 
     rays: Rays
     rays_in_all: int  # of the step, on all ranks
+    first_row: int  # training frame of the step's first ray
     row: Tensor  # (R,) training frame of each ray
     near: Tensor  # (R,) metres along the ray between which the person can be
     far: Tensor  # (R,)
@@ -30,6 +31,32 @@ class Batch:
     has_mask: Tensor  # (R,) 0 where the frame came without a mask
     background: Tensor  # (R, 3)
     jitter: Tensor  # (R, J) in [0, 1), as many as the scene's rays take
+
+    def part(self, rows: slice) -> Batch:
+        """Some of the rays."""
+        return Batch(
+            self.rays.select(rows),
+            self.rays_in_all,
+            self.first_row,
+            self.row[rows],
+            self.near[rows],
+            self.far[rows],
+            self.rgb[rows],
+            self.mask[rows],
+            self.has_mask[rows],
+            self.background[rows],
+            self.jitter[rows],
+        )
+
+
+class PixelSource(Protocol):
+    """Where a step's rays come from."""
+
+    def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
+        """Random rays of a few frames."""
+
+    def problem(self, batch: Batch) -> str | None:
+        """What is wrong with a batch, in words; None if all is well."""
 
 
 class TrainingPixels:
@@ -44,13 +71,11 @@ class TrainingPixels:
         clip: Clip,
         scene: PosedScene,
         held_out: HeldOutPixels | None = None,
-        ranks: Ranks = ALONE,
     ) -> None:
         """Args: scene with a row for each training frame."""
         rows = np.flatnonzero(~clip.held_out)
         self.jitters = scene.jitters
         self.camera = clip.camera
-        self.ranks = ranks
         pixels = clip.camera.width * clip.camera.height
         self.frames = torch.from_numpy(clip.frames[rows].reshape(len(rows), pixels, 3))
         self.masks = torch.from_numpy(clip.masks[rows].reshape(len(rows), pixels))
@@ -86,23 +111,18 @@ class TrainingPixels:
         return f"frame {frame} has colours or rays that are not finite"
 
     def batch(self, rays: int, frames: int, generator: torch.Generator) -> Batch:
-        """Rays of a few frames, uniform over frames and over each frame's candidate pixels.
-
-        All are drawn, and those of this rank are given.
-        """
+        """Rays of a few frames, uniform over frames and over each frame's candidate pixels."""
         draws = torch.randint(len(self.in_sight), (frames,), generator=generator)
         chosen = self.in_sight[draws]
         row = chosen.repeat_interleave(-(-rays // frames))[:rays]
         place = torch.rand(rays, generator=generator, dtype=torch.float64)
-        jitter = torch.rand(rays, self.jitters, generator=generator)
-        mine = self.ranks.part(rays)
-        row, place = row[mine], place[mine]
         found = self.starts[row] + (place * self.counts[row]).long()
         pixel = self.candidates[found]
         through, along = pixel_rays(self.camera, pixel)
         return Batch(
             through,
             rays,
+            int(chosen[0]),
             row,
             self.nearest[found] * along,
             self.farthest[found] * along,
@@ -110,5 +130,5 @@ class TrainingPixels:
             self.masks[row, pixel].float(),
             self.has_mask[row].float(),
             self.background[pixel].float() / 255.0,
-            jitter[mine],
+            torch.rand(rays, self.jitters, generator=generator),
         )

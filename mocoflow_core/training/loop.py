@@ -15,7 +15,7 @@ from torch import Tensor
 
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
-from mocoflow_core.training.batches import TrainingPixels
+from mocoflow_core.training.batches import Batch, PixelSource
 from mocoflow_core.training.checkpoint import (
     Progress,
     Restored,
@@ -48,22 +48,23 @@ class TrainingRun:
     """One optimisation, started or resumed.
 
     ``score`` is ``train_psnr`` of the held-out pixels, asked while the clock stands still; each
-    snapshot hands the curve so far to ``watch``. ``made_with`` is what a checkpoint must have been
-    made with. Of several ranks each runs one; all take the same decisions, as these depend on
-    joint losses and on the first rank's clock, and only the first one scores, writes and reports.
+    snapshot hands the curve so far to ``watch``. Without a watcher none are kept. ``made_with`` is
+    what a checkpoint must have been made with. Of several ranks each runs one; all take the same
+    decisions, as these depend on joint losses and on the first rank's clock, and only the first
+    one scores, writes and reports.
     """
 
     def __init__(
         self,
         field: SceneField,
         objective: Objective,
-        pixels: TrainingPixels,
+        pixels: PixelSource,
         schedule: ScheduleConfig,
         seed: int,
         before: Seconds,
         workspace: Path,
         progress: Callable[[float, str], None],
-        watch: Callable[[list[Snapshot]], None],
+        watch: Callable[[list[Snapshot]], None] | None,
         score: Score | None,
         clock: TrainingClock,
         ranks: Ranks = ALONE,
@@ -193,7 +194,7 @@ class TrainingRun:
         """The work of a step without its effect: for choosing the number of threads."""
         generator = torch.Generator().manual_seed(0)
         batch = self.pixels.batch(self.schedule.rays, self.schedule.frames_per_step, generator)
-        _sum(self.objective(batch, generator)).backward()
+        _sum(self.objective(self._mine(batch), generator)).backward()
         self.optimiser.zero_grad(set_to_none=True)
 
     @torch.no_grad()
@@ -202,22 +203,28 @@ class TrainingRun:
         generator = torch.Generator().manual_seed(0)
         rays = max(self.schedule.rays, _START_RAYS)
         batch = self.pixels.batch(rays, self.schedule.frames_per_step, generator)
-        return float(self.ranks.total(_sum(self.objective(batch, generator))))
+        own_terms = self.objective(self._mine(batch), generator)
+        return float(self.ranks.total(_sum(own_terms)))
+
+    def _mine(self, batch: Batch) -> Batch:
+        """All ranks draw the same rays; each looks along its own."""
+        return batch.part(self.ranks.part(len(batch.rays)))
 
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
         schedule, step = self.schedule, self.progress.step
-        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands))
+        limits = (schedule.first_bands, schedule.last_bands)
+        self.field.anneal(band_alpha(share, schedule.coarse_share, self.field.bands, *limits))
         factor = rate_factor(share, schedule.final_rate) * self.guard.rate_scale
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
         batch = self.pixels.batch(self.progress.rays, schedule.frames_per_step, self.generator)
-        own_terms = self._shared(batch, self.generator)
+        own_terms = self._shared(self._mine(batch), self.generator)
         self.optimiser.zero_grad(set_to_none=True)
         # Gradients become means over ranks; the losses are sums over them.
         (_sum(own_terms) * self.ranks.count).backward()
         terms = _joint(own_terms, self.ranks)
-        problem = self.ranks.said(self.pixels.problem(batch)) or self.guard.problem(terms)
+        problem = self.pixels.problem(batch) or self.guard.problem(terms)
         # These weights have just given finite losses and gradients; the next ones are unknown.
         if problem is None and step % _REMEMBER_EVERY == 0:
             problem = self.guard.settle()
@@ -247,8 +254,8 @@ class TrainingRun:
             self._snapshot()
 
     def _snapshot(self) -> None:
-        if self.guard.problem({}) is not None:
-            return  # the next step refuses it
+        if self.watch is None or self.guard.problem({}) is not None:
+            return  # a bad state is refused by the next step
         self.progress.snapshot_s = self.progress.elapsed.wall
         psnr = self._train_psnr()
         with self.clock.paused():
@@ -256,7 +263,9 @@ class TrainingRun:
 
     def _keep(self, psnr: float | None) -> None:
         step, now = self.progress.step, self.progress.elapsed
-        self.watch(keep_snapshot(self.workspace, self.field, step, now, psnr))
+        curve = keep_snapshot(self.workspace, self.field, step, now, psnr)
+        if self.watch is not None:
+            self.watch(curve)
 
     def _train_psnr(self) -> float | None:
         with self.clock.paused():
@@ -288,4 +297,5 @@ def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optim
         {"params": parameters, "lr": rate}
         for parameters, rate in zip(field.rate_groups(), rates, strict=True)
     ]
-    return torch.optim.Adam(groups, betas=(0.9, 0.99), eps=1e-10, fused=True)
+    betas = (0.9, schedule.adam_beta2)
+    return torch.optim.Adam(groups, betas=betas, eps=schedule.adam_epsilon, fused=True)

@@ -12,7 +12,7 @@ from mocoflow_core.losses.photometric import photometric, silhouette
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.rendering.shell_scene import ShellRays, ShellScene
 from mocoflow_core.training.batches import Batch
-from mocoflow_core.training.ranks import ALONE, Ranks
+from mocoflow_core.training.ranks import ALONE, Ranks, own_of
 
 
 class Objective(Protocol):
@@ -60,7 +60,11 @@ class ShellObjective:
         """Consensus and regularity of the motion at a few samples that have density."""
         weights, shell, scene = self.losses, rendered.shell, self.scene
         solid = (rendered.density.detach() > weights.density_threshold).nonzero()[:, 0]
-        chosen, count = self._draw(solid, generator)
+        earlier, everywhere = self.ranks.before(len(solid))
+        drawn = min(weights.consensus_points or everywhere, everywhere)
+        pick = torch.randint(max(everywhere, 1), (drawn,), generator=generator)
+        chosen = solid[own_of(pick, earlier, len(solid))]
+        count = max(drawn, 1)
         points, body, row = shell.samples.points[chosen], shell.canonical[chosen], shell.row[chosen]
         motion, moments = scene.field.motion, scene.moments
         frames = len(moments.codes)
@@ -73,20 +77,10 @@ class ShellObjective:
         if weights.consensus_weight > 0:
             moves = (scene.to_canonical, scene.to_observed)
             other = torch.randint(frames, (1,), generator=generator).expand_as(row)
-            local = local_consensus(*moves, points, row, self.ranks.total)
-            far = global_consensus(*moves, points, row, other, self.ranks.total)
+            in_all = self.ranks.total
+            local = local_consensus(*moves, points, row, in_all=in_all)
+            far = global_consensus(*moves, points, row, other, in_all=in_all)
             terms["consensus"] = weights.consensus_weight * (
                 weights.local_share * local + weights.global_share * far
             )
         return terms
-
-    def _draw(self, solid: Tensor, generator: torch.Generator) -> tuple[Tensor, int]:
-        """A few of all ranks' solid samples: those of this rank (P,), and how many they are in all.
-
-        Samples are sorted by ray, so one draw over the samples of all ranks is the draw of one
-        process that has all rays.
-        """
-        earlier, everywhere = self.ranks.before(len(solid))
-        points = min(self.losses.consensus_points, everywhere)
-        drawn = torch.randint(max(everywhere, 1), (points,), generator=generator) - earlier
-        return solid[drawn[(drawn >= 0) & (drawn < len(solid))]], max(points, 1)

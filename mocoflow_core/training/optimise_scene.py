@@ -88,7 +88,7 @@ def optimise_scene(
         score = None
         if held_out is not None and ranks.is_first:
             score = HeldOutScore.prepare(clip, held_out, problem.space, problem.field)
-    pixels = TrainingPixels(clip, problem.scene, held_out, ranks)
+    pixels = TrainingPixels(clip, problem.scene, held_out)
     ranks.first(lambda: _begin(problem, workspace))
     run = TrainingRun(
         problem.field,

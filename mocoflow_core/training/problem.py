@@ -29,7 +29,7 @@ class Learned:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A field with fresh weights, the scene that it makes at the training frames, its losses."""
+    """A field to be trained, the scene that it makes at the training frames, its losses."""
 
     space: Space
     field: SceneField

@@ -66,10 +66,6 @@ class Ranks:
         """Wall seconds of the first rank and CPU seconds of all."""
         return own
 
-    def said(self, words: str | None) -> str | None:
-        """What the first rank that has something to say says."""
-        return words
-
     def first(self, work: Callable[[], Value]) -> Value:
         """Let the first rank do something and tell all what came of it; the others wait.
 
@@ -142,13 +138,6 @@ class SeveralRanks(Ranks):
         process_group.all_reduce(joint)
         return Seconds(*joint.tolist())
 
-    def said(self, words: str | None) -> str | None:
-        speaker = torch.tensor(self.count if words is None else self.rank)
-        process_group.all_reduce(speaker, process_group.ReduceOp.MIN)
-        if int(speaker) == self.count:
-            return None
-        return _broadcast((words or "").encode(), int(speaker)).decode()
-
     def first(self, work: Callable[[], Value]) -> Value:
         said = self.first_bytes(lambda: json.dumps(work()).encode())
         return cast(Value, json.loads(said))
@@ -165,6 +154,16 @@ class SeveralRanks(Ranks):
         if not done.startswith(b"+"):
             raise FirstRankFailed("the first rank failed; its own words say why")
         return done[1:]
+
+
+def own_of(drawn: Tensor, earlier: int, own: int) -> Tensor:
+    """Those of the numbers drawn from all ranks' things that are this rank's, counted from its own.
+
+    Things are sorted by ray, so one draw over those of all ranks is the draw of a process that
+    has all rays.
+    """
+    mine = drawn - earlier
+    return mine[(mine >= 0) & (mine < own)]
 
 
 @contextmanager
