@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
 
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
@@ -13,29 +17,31 @@ from mocoflow_core.fields.scene_shape import SceneShape
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.training.clock import Seconds, TrainingClock, unheard
 from mocoflow_core.training.fit_motion import MotionStart
+from mocoflow_core.training.network_stages import network_problem
 from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene, unwatched
-from mocoflow_core.training.problem import Learned, shell_problem
+from mocoflow_core.training.problem import Learned, Problem, shell_problem
 from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot
 
 
-class ShellJob(ConfigurationPart):
-    """The fast representation's optimisation.
+class TrainingJob(ConfigurationPart):
+    """The optimisation of a scene, whatever it is made of.
 
-    Folders are those of finished stages, the same on all machines. Ranks of one machine map the
-    clip's file of frames, so that it is read from the disk once.
+    Folders are those of finished stages, at the same paths on all machines. The ranks of one
+    machine map the clip's file of frames, so that the disk is read once.
     """
 
     clip: Path
-    density: Path
-    motion: Path
-    shape: SceneShape
     learned: Learned
     losses: LossConfig
     schedule: ScheduleConfig
     seed: int
-    before: Seconds
+    before: Seconds = Field(description="training clock of the stages so far")
+
+    @abstractmethod
+    def problem(self, clip: Clip, ranks: Ranks) -> Problem:
+        """What is learned, made anew."""
 
     def run(
         self,
@@ -46,17 +52,10 @@ class ShellJob(ConfigurationPart):
         ranks: Ranks = ALONE,
     ) -> OptimisationResult:
         """Train in this process, alone or as one of several; see ``optimise_scene``."""
-        problem = shell_problem(
-            CanonicalDensity.load(self.density),
-            MotionStart.load(self.motion),
-            self.shape,
-            self.learned,
-            self.losses,
-            self.seed,
-            ranks,
-        )
+        clip = Clip.load(self.clip)
+        problem = self.problem(clip, ranks)
         return optimise_scene(
-            Clip.load(self.clip),
+            clip,
             problem,
             self.schedule,
             self.seed,
@@ -68,7 +67,42 @@ class ShellJob(ConfigurationPart):
         )
 
 
-def read_job(file: Path) -> ShellJob:
+class ShellJob(TrainingJob):
+    """With the fast representation."""
+
+    kind: Literal["shell"] = "shell"
+    density: Path
+    motion: Path
+    shape: SceneShape
+
+    def problem(self, clip: Clip, ranks: Ranks) -> Problem:
+        return shell_problem(
+            CanonicalDensity.load(self.density),
+            MotionStart.load(self.motion),
+            self.shape,
+            self.learned,
+            self.losses,
+            self.seed,
+            ranks,
+        )
+
+
+class NetworkJob(TrainingJob):
+    """With the paper's networks, from the weights that the stage before has left."""
+
+    kind: Literal["networks"] = "networks"
+    fitted: Path
+
+    def problem(self, clip: Clip, ranks: Ranks) -> Problem:
+        return network_problem(self.fitted, clip, self.learned, self.losses, self.seed, ranks)
+
+
+_JOBS: TypeAdapter[ShellJob | NetworkJob] = TypeAdapter(
+    Annotated[ShellJob | NetworkJob, Field(discriminator="kind")]
+)
+
+
+def read_job(file: Path) -> TrainingJob:
     """A job that was written as JSON. Raises InputError where there is none."""
     if not file.is_file():
         raise InputError(
@@ -76,4 +110,4 @@ def read_job(file: Path) -> ShellJob:
             f"{file}, which does not exist",
             "Start the first machine first, with its store at the same path on all machines.",
         )
-    return ShellJob.model_validate_json(file.read_bytes())
+    return _JOBS.validate_json(file.read_bytes())

@@ -20,7 +20,7 @@ from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.training.checkpoint import elapsed_at_checkpoint
 from mocoflow_core.training.devices import Devices
 from mocoflow_core.training.guard import TrainingDiverged
-from mocoflow_core.training.job import ShellJob, read_job
+from mocoflow_core.training.job import TrainingJob, read_job
 from mocoflow_core.training.launch import ProcessFailed, run_logged
 from mocoflow_core.training.messages import Listener, Teller
 from mocoflow_core.training.optimise_scene import RESULT, OptimisationResult
@@ -37,7 +37,7 @@ class RanksFailed(RuntimeError):
 
 def optimise_on(
     devices: Devices,
-    job: ShellJob,
+    job: TrainingJob,
     workspace: Path,
     progress: Callable[[float, str], None],
     watch: Callable[[list[Snapshot]], None],
@@ -148,7 +148,7 @@ def _run(
 
 
 @contextmanager
-def _written(job: ShellJob, file: Path) -> Iterator[Path]:
+def _written(job: TrainingJob, file: Path) -> Iterator[Path]:
     file.write_text(job.model_dump_json(indent=1))
     try:
         yield file
