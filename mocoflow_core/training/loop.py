@@ -34,7 +34,9 @@ from mocoflow_core.training.snapshots import Snapshot, forget_snapshots, keep_sn
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
-_START_RAYS = 1024  # that tell how large the losses are at the start
+# That tell how large the losses are at the start: of a single frame they may be next to nothing.
+_START_RAYS = 1024
+_START_FRAMES = 16
 
 Score = Callable[[], float]
 Chosen = TypeVar("Chosen", int, int | None)
@@ -199,12 +201,16 @@ class TrainingRun:
 
     @torch.no_grad()
     def _start_loss(self) -> float:
-        """What the losses sum to before anything is learned, over enough rays to rely on."""
+        """What the losses sum to before anything is learned, over enough rays and frames."""
         generator = torch.Generator().manual_seed(0)
-        rays = max(self.schedule.rays, _START_RAYS)
-        batch = self.pixels.batch(rays, self.schedule.frames_per_step, generator)
-        own_terms = self.objective(self._mine(batch), generator)
-        return float(self.ranks.total(_sum(own_terms)))
+        frames = self.schedule.frames_per_step
+        batches = -(-_START_FRAMES // frames)
+        rays = -(-max(self.schedule.rays, _START_RAYS) // batches)
+        found = 0.0
+        for _ in range(batches):
+            own = self._mine(self.pixels.batch(rays, frames, generator))
+            found += float(self.ranks.total(_sum(self.objective(own, generator))))
+        return found / batches
 
     def _mine(self, batch: Batch) -> Batch:
         """All ranks draw the same rays; each looks along its own."""

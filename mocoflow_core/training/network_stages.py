@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from pydantic import JsonValue
 from safetensors.torch import load_file, save_file
 
@@ -28,6 +29,7 @@ from mocoflow_core.rendering.frame_box import BoxConfig, Follows, frame_boxes
 from mocoflow_core.training.batches import PixelSource, TrainingPixels
 from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_points import FitPoints
+from mocoflow_core.training.guard import TrainingDiverged
 from mocoflow_core.training.held_out import draw_held_out
 from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.mesh_views import MeshViews, MeshViewsConfig
@@ -37,6 +39,7 @@ from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 
 _WEIGHTS = "model.safetensors"
+_MOST_EMPTY = 0.5  # of the mesh's vertices, which lie on the surface itself
 
 Progress = Callable[[float, str], None]
 
@@ -87,6 +90,9 @@ def pretrain_networks(
         moves: false: the canonical body stands in every frame.
         schedule: of this stage alone.
 
+    Raises:
+        TrainingDiverged: no density is left on the body, or too many bad steps.
+
     Source: MoCo-Flow sec. 3.4, first stage.
     """
     torch.manual_seed(seed)
@@ -105,7 +111,9 @@ def pretrain_networks(
     objective = NetworkObjective(scene, losses, consensus=False)
     pixels = MeshViews(space.canonical_vertices, meshes.faces, scene, views)
     problem = Problem(space, field, scene, objective, _settings(space, learned, losses))
-    return _train(problem, pixels, schedule, seed, workspace, progress, clock)
+    result = _train(problem, pixels, schedule, seed, workspace, progress, clock)
+    require_density(field, space.canonical_vertices)
+    return result
 
 
 def fit_networks(
@@ -246,6 +254,23 @@ def _train(
     (workspace / "stage.json").write_text(json.dumps(asdict(result)))
     run.forget_checkpoint()
     return result
+
+
+@torch.no_grad()
+def require_density(field: NetworkField, vertices: NDArray[np.float32]) -> None:
+    """A ReLU that has ended below zero everywhere has no gradient to come back.
+
+    Raises TrainingDiverged where most of the canonical mesh's vertices (V, 3) have no density.
+    """
+    for name, network in (("coarse", field.coarse), ("fine", field.fine)):
+        density, _ = field.density(network, torch.from_numpy(vertices))
+        empty = float((density == 0).float().mean())
+        if empty > _MOST_EMPTY:
+            raise TrainingDiverged(
+                f"the {name} network has no density on {100 * empty:.0f} % of the canonical mesh "
+                "after pretraining. Lower schedule.rate_networks or networks.density_unit_per_m, "
+                "raise mesh_views.on_body, or take another --seed."
+            )
 
 
 def _untrained(field: NetworkField, workspace: Path) -> StageResult:
