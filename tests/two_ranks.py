@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,9 @@ class TwoRanks:
     def __call__(self, function: Callable[..., Any], *args: object) -> list[Any]:
         """What both give back, by rank; an exception is raised here."""
         waiting = [pool.submit(function, *args) for pool in self._pools]
+        # The one that fails first says why; the other one only that nobody answers.
+        for ended in as_completed(waiting):
+            ended.result()
         return [ended.result() for ended in waiting]
 
     def close(self) -> None:

@@ -191,7 +191,8 @@ class BoxScene:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """rgb (R, 3), opacity (R,) and density (S,) with gradients where they can be felt."""
         rays, ray = len(background), samples.ray
-        thickness = (density * samples.step_m).reshape(rays, -1)
+        # Not -1: there may be no ray at all.
+        thickness = (density * samples.step_m).reshape(rays, len(density) // max(rays, 1))
         ahead = (thickness.cumsum(1) - thickness).reshape(-1)
         felt = ((density > 0) & (ahead < _HIDDEN)).nonzero()[:, 0]
         present, hidden = self.field.density(network, canonical[felt])
@@ -209,5 +210,6 @@ def _in_order(first: Tensor, second: Tensor, order: Tensor) -> Tensor:
     """Points of the coarse (R N, 3) and the added samples (R M, 3), merged as the order (R, N + M)
     of their distances says, (R (N + M), 3)."""
     rays = len(order)
-    both = torch.cat([first.reshape(rays, -1, 3), second.reshape(rays, -1, 3)], 1)
+    parts = [points.reshape(rays, len(points) // max(rays, 1), 3) for points in (first, second)]
+    both = torch.cat(parts, 1)
     return both.gather(1, order[..., None].expand(-1, -1, 3)).reshape(-1, 3)

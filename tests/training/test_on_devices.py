@@ -10,8 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import torch
-from safetensors.torch import load_file
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.training.clock import Seconds
@@ -19,8 +17,8 @@ from mocoflow_core.training.devices import Devices
 from mocoflow_core.training.job import ShellJob, read_job
 from mocoflow_core.training.on_devices import JOB, RanksFailed, optimise_on
 from mocoflow_core.training.problem import Learned
+from tests.joint_training import digest, killed_alone, parameters, train_here
 from tests.toy_training import LOSSES, SCHEDULE
-from tests.training.test_ranks import digest, killed_alone, train_here
 
 TWO = Devices(here=2)
 
@@ -76,10 +74,6 @@ class Watcher:
     def leave_out(self, wall_s: float, cpu_s: float) -> None:
         self.aside[0] += wall_s
         self.aside[1] += cpu_s
-
-
-def parameters(folder: Path) -> dict[str, torch.Tensor]:
-    return load_file(folder / "model.safetensors")
 
 
 LAUNCHER = "mocoflow_core.training.elastic"
