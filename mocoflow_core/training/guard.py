@@ -14,11 +14,12 @@ from statistics import median
 import torch
 from torch import Tensor, nn
 
-# Losses vary with the rays that are drawn. What counts is the median of the last steps, at least so
-# many of them and so many rays.
+# Losses vary with the rays and the frames that are drawn. What counts is the median of the last
+# steps, at least so many of them, of rays and of frames.
 _RECENT_STEPS = 10
 _FEWEST_STEPS = 5
 _RECENT_RAYS = 1000
+_RECENT_FRAMES = 40
 # A rise above the best by the first factor is met at once, by the second when a state is to be
 # kept: a scene in which nothing is left to see costs two to four times the losses of its start.
 _ASTRAY = 4.0
@@ -48,14 +49,16 @@ class Guard:
         optimiser: torch.optim.Optimizer,
         allowed: int,
         rays: int = _RECENT_RAYS,
+        frames: int = _RECENT_FRAMES,
     ) -> None:
-        """Args: allowed events before the run stops, rays of one step."""
+        """Args: allowed events before the run stops, rays and frames of one step."""
         self.model = model
         self.optimiser = optimiser
         self.allowed = allowed
         self.events: list[GuardEvent] = []
         self.rate_scale = 1.0
-        self.recent: deque[float] = deque(maxlen=max(_RECENT_STEPS, -(-_RECENT_RAYS // rays)))
+        steps = max(_RECENT_STEPS, -(-_RECENT_RAYS // rays), -(-_RECENT_FRAMES // frames))
+        self.recent: deque[float] = deque(maxlen=steps)
         self.best = math.inf
         bad = self._not_finite() or self._moment_not_finite()
         if bad is not None:

@@ -92,7 +92,13 @@ class TrainingRun:
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
         restored = self._restored()
         self.progress = restored.progress if restored else self._first_start()
-        self.guard = Guard(field, self.optimiser, _ALLOWED_EVENTS, self.progress.rays)
+        self.guard = Guard(
+            field,
+            self.optimiser,
+            _ALLOWED_EVENTS,
+            self.progress.rays,
+            schedule.frames_per_step,
+        )
         self.guard.expect(self.progress.best)
         self.guard.events = self.progress.events
         self.guard.rate_scale = self.progress.rate_scale
