@@ -13,7 +13,7 @@ from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
 
 # Written out: the presets themselves take torch, which takes a second.
-PRESET_HELP = "fast, toy, paper, paper_aist or paper_zju_mocap."
+PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(
     help="A moving person, filmed by one fixed camera, seen from any side at any time.",

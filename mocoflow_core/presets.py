@@ -13,6 +13,7 @@ from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
 from mocoflow_core.fields.network_field import NetworksConfig
 from mocoflow_core.fields.scene_shape import MotionConfig
+from mocoflow_core.fields.skip_network import SkipConfig
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.methods.presentation import PresentationConfig
 from mocoflow_core.methods.truth_errors import TruthConfig
@@ -99,6 +100,30 @@ def paper_zju_mocap() -> Configuration:
     return _with_steps(800_000, 2_000_000, 1_500_000)
 
 
+def paper_small() -> Configuration:
+    """The paper's method shrunk to minutes on two CPU cores: a reference, not a result."""
+    size = SkipConfig(layers=4, width=64, skip=2)
+    chosen = paper()
+    return chosen.model_copy(
+        update={
+            "networks": NetworksConfig(radiance=size, motion=size, colour_width=32),
+            "box": BoxConfig(coarse_samples=24, fine_samples=32),
+            "mesh_views": MeshViewsConfig(views=40, side_px=100),
+            "schedule": chosen.schedule.model_copy(
+                update={
+                    "pretrain_steps": 1000,
+                    "fit_steps": 1000,
+                    "coarse_steps": 1200,
+                    "fine_steps": 800,
+                    "rays": 256,
+                    "rate_networks": 2e-3,
+                    "rate_motion": 1e-3,
+                }
+            ),
+        }
+    )
+
+
 def _with_steps(fit: int, coarse: int, fine: int) -> Configuration:
     """The paper's configuration with other (N1, N2, N3)."""
     chosen = paper()
@@ -107,7 +132,7 @@ def _with_steps(fit: int, coarse: int, fine: int) -> Configuration:
     return chosen.model_copy(update={"schedule": schedule})
 
 
-Preset = Literal["fast", "toy", "paper", "paper_aist", "paper_zju_mocap"]
+Preset = Literal["fast", "toy", "paper", "paper_aist", "paper_zju_mocap", "paper_small"]
 
 PRESETS: dict[str, Callable[[], Configuration]] = {
     "fast": fast,
@@ -115,4 +140,5 @@ PRESETS: dict[str, Callable[[], Configuration]] = {
     "paper": paper,
     "paper_aist": paper_aist,
     "paper_zju_mocap": paper_zju_mocap,
+    "paper_small": paper_small,
 }

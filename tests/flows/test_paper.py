@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from flows.command_line import PRESET_HELP
 from mocoflow_core.errors import InputError
 from mocoflow_core.metrics.curve import read_curve
 from mocoflow_core.metrics.table import read_scores
-from mocoflow_core.presets import PRESETS
+from mocoflow_core.presets import PRESETS, Preset
 from tests.flows.stages import STAGES
 
 TINY = (
@@ -73,6 +75,11 @@ def test_a_decision_of_the_other_representation_is_refused(reconstruct, toy_scen
     settings = (*TINY, "plan.fixed_light=on")
     with pytest.raises(InputError, match="representation=networks"):
         reconstruct(toy_scene, tmp_path / "light", preset="paper", settings=settings)
+
+
+def test_every_preset_is_named_in_help_and_type():
+    assert tuple(PRESETS) == get_args(Preset)
+    assert all(name in PRESET_HELP for name in PRESETS)
 
 
 def test_the_presets_of_the_three_data_sets_have_the_paper_s_steps():

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -219,7 +220,8 @@ def test_a_budget_below_the_preparation_leaves_the_start_scene_and_says_so(prepa
     start = prepared.field(seed=0).state_dict()
     assert all(torch.equal(start[name], value) for name, value in parameters(tmp_path).items())
     assert "untrained" in result.warnings[0]
-    assert "12." in result.warnings[0]
+    took_s = float(re.search(r"took ([\d.]+) s", result.warnings[0])[1])
+    assert 12.0 <= took_s < 60.0  # and the stage's own start, on however busy a machine
     assert len(read_snapshots(tmp_path)) == 1
     opened = TrainedScene.open(tmp_path)
     rgb, opacity = opened.render(prepared.clip.camera, 0.5)
