@@ -25,6 +25,9 @@ class Rays:
         """Points at the given distances (R,) along the rays, (R, 3)."""
         return self.origins + distance_m[:, None] * self.directions
 
+    def to(self, device: torch.device) -> Rays:
+        return Rays(self.origins.to(device), self.directions.to(device))
+
     def select(self, rows: Tensor | slice) -> Rays:
         return Rays(self.origins[rows], self.directions[rows])
 

@@ -45,9 +45,12 @@ class BoxScene:
     def __init__(
         self, field: NetworkField, boxes: FrameBoxes, coarse_samples: int, fine_samples: int
     ) -> None:
-        """Args: boxes with a row for each moment; their times are those of the moments."""
+        """Args: boxes with a row for each moment; their times are those of the moments.
+
+        They go to the device that the field lies on.
+        """
         self.field = field
-        self.boxes = boxes
+        self.boxes = boxes.to(field.device)
         self.coarse_samples = coarse_samples
         self.jitters = coarse_samples + fine_samples
 
@@ -63,14 +66,14 @@ class BoxScene:
 
     def pixels(self, camera: Camera, row: int) -> VisiblePixels:
         """All pixels, as the paper draws them; those that miss the box have no depth range."""
-        pixels = torch.arange(camera.width * camera.height)
+        pixels = torch.arange(camera.width * camera.height, device=self.field.device)
         rays, along = pixel_rays(camera, pixels)
         near, far = self.boxes.intersect(rays, torch.full_like(pixels, row))
         hit = far > near
         return VisiblePixels(
-            pixels,
-            torch.where(hit, near, 0.0) / along,
-            torch.where(hit, far, 0.0) / along,
+            pixels.cpu(),
+            (torch.where(hit, near, 0.0) / along).cpu(),
+            (torch.where(hit, far, 0.0) / along).cpu(),
         )
 
     def to_canonical(self, points: Tensor, row: Tensor) -> tuple[Tensor, Tensor]:

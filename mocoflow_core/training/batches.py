@@ -32,20 +32,24 @@ class Batch:
     background: Tensor  # (R, 3)
     jitter: Tensor  # (R, J) in [0, 1), as many as the scene's rays take
 
-    def part(self, rows: slice) -> Batch:
-        """Some of the rays."""
+    def part(self, rows: slice, device: torch.device) -> Batch:
+        """Some of the rays, on a device."""
+
+        def these(values: Tensor) -> Tensor:
+            return values[rows].to(device)
+
         return Batch(
-            self.rays.select(rows),
+            self.rays.select(rows).to(device),
             self.rays_in_all,
             self.first_row,
-            self.row[rows],
-            self.near[rows],
-            self.far[rows],
-            self.rgb[rows],
-            self.mask[rows],
-            self.has_mask[rows],
-            self.background[rows],
-            self.jitter[rows],
+            these(self.row),
+            these(self.near),
+            these(self.far),
+            these(self.rgb),
+            these(self.mask),
+            these(self.has_mask),
+            these(self.background),
+            these(self.jitter),
         )
 
 

@@ -220,7 +220,7 @@ class TrainingRun:
 
     def _mine(self, batch: Batch) -> Batch:
         """All ranks draw the same rays; each looks along its own."""
-        return batch.part(self.ranks.part(len(batch.rays)))
+        return batch.part(self.ranks.part(len(batch.rays)), self.ranks.device)
 
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""

@@ -67,7 +67,7 @@ class NetworkObjective:
         earlier, everywhere = self.ranks.before(len(solid))
         if weights.consensus_points is not None and everywhere > weights.consensus_points:
             pick = torch.randint(everywhere, (weights.consensus_points,), generator=generator)
-            solid = solid[own_of(pick, earlier, len(solid))]
+            solid = solid[own_of(pick.to(solid), earlier, len(solid))]
         points, row = rendered.samples.points[solid], rendered.row[solid]
         mapped = (rendered.canonical[solid], torch.ones_like(row, dtype=torch.bool))
         moves = (scene.to_canonical, scene.to_observed, points, row)

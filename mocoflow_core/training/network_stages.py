@@ -167,7 +167,7 @@ def network_problem(
 
     Raises FileNotFoundError where a part is missing: nothing starts from scratch in silence.
     """
-    space, field, scene = _opened(folder, clip, learned, seed)
+    space, field, scene = _opened(folder, clip, learned, seed, ranks)
     consensus = learned.consensus and field.moves
     objective = NetworkObjective(scene, losses, consensus, ranks=ranks)
     return Problem(space, field, scene, objective, _settings(space, learned, losses), ranks)
@@ -182,13 +182,14 @@ def _settings(space: BoxSpace, learned: Learned, losses: LossConfig) -> dict[str
 
 
 def _opened(
-    folder: Path, clip: Clip, learned: Learned, seed: int
+    folder: Path, clip: Clip, learned: Learned, seed: int, ranks: Ranks = ALONE
 ) -> tuple[BoxSpace, NetworkField, BoxScene]:
     """What a stage before has left, and the scene at the training frames."""
     torch.manual_seed(seed)
     space = BoxSpace.load(folder)
     field = space.build()
     field.load_state_dict(load_file(folder / _WEIGHTS))
+    field.to(ranks.device)
     field.appearance.requires_grad_(learned.appearance_codes)
     for parameter in field.motion_parameters():
         parameter.requires_grad_(field.moves)

@@ -63,7 +63,7 @@ class ShellObjective:
         earlier, everywhere = self.ranks.before(len(solid))
         drawn = min(weights.consensus_points or everywhere, everywhere)
         pick = torch.randint(max(everywhere, 1), (drawn,), generator=generator)
-        chosen = solid[own_of(pick, earlier, len(solid))]
+        chosen = solid[own_of(pick.to(solid), earlier, len(solid))]
         count = max(drawn, 1)
         points, body, row = shell.samples.points[chosen], shell.canonical[chosen], shell.row[chosen]
         motion, moments = scene.field.motion, scene.moments
@@ -76,7 +76,7 @@ class ShellObjective:
         }
         if weights.consensus_weight > 0:
             moves = (scene.to_canonical, scene.to_observed)
-            other = torch.randint(frames, (1,), generator=generator).expand_as(row)
+            other = torch.randint(frames, (1,), generator=generator).to(row).expand_as(row)
             in_all = self.ranks.total
             local = local_consensus(*moves, points, row, in_all=in_all)
             far = global_consensus(*moves, points, row, other, in_all=in_all)

@@ -51,7 +51,7 @@ def shell_problem(
     """The fast representation: the body's motion with a residual, a grid on top of the mesh."""
     torch.manual_seed(seed)
     space = ShellSpace(shape, density, motion.controls)
-    field = space.build()
+    field = space.build().to(ranks.device)
     _freeze_what_is_not_needed(field, learned)
     scene = space.at_training_frames(field, motion.body)
     weights = losses if learned.consensus else losses.model_copy(update={"consensus_weight": 0.0})

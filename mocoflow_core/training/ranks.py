@@ -37,6 +37,7 @@ class Ranks:
 
     rank = 0
     count = 1
+    device = torch.device("cpu")
 
     @property
     def is_first(self) -> bool:
@@ -103,6 +104,8 @@ class SeveralRanks(Ranks):
         """Args: leads: the first rank is the lowest one that does; one at least must."""
         self.rank = process_group.get_rank()
         self.count = process_group.get_world_size()
+        if torch.cuda.is_available():
+            self.device = torch.device("cuda", torch.cuda.current_device())
         leader = torch.tensor(self.rank if leads else self.count)
         process_group.all_reduce(leader, process_group.ReduceOp.MIN)
         self._leader = int(leader)
