@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
-from flows.demo_scene import demo_scene
+from flows.benchmark_scenes import AskedScene, read_scenes
 from flows.request import Request, open_users_store
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.store import Store
-from mocoflow_core.methods.ablations import SETTINGS
+from mocoflow_core.methods.ablations import SETTINGS, require_method
 from mocoflow_core.methods.benchmark_folder import BenchmarkFolder, BenchmarkRecord, CellRecord
+from mocoflow_core.methods.experiments import EXPERIMENTS, USUAL, Experiment
 from mocoflow_core.methods.scoring import METHODS
 from mocoflow_core.metrics.time_to_target import TargetConfig, read_target
 from mocoflow_core.presets import PRESETS
 from mocoflow_core.settings import with_settings
-from mocoflow_core.synthetic.catalogue import named_scene
+
+# What an experiment says where the user does not.
+_FROM_EXPERIMENT = ("scenes", "methods", "presets")
 
 
 class Cell(NamedTuple):
@@ -32,19 +35,37 @@ class Cell(NamedTuple):
 
 
 class BenchmarkRequest(BaseModel):
-    """The parameters of a benchmark; the flow and the command line share them."""
+    """The parameters of a benchmark; the flow and the command line share them.
+
+    What is absent or None is taken from the experiment; its settings come before the user's.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    experiment: str | None = None
     scenes: tuple[str, ...]
     out: Path
-    methods: tuple[str, ...] = METHODS
-    presets: tuple[str, ...] = ("fast",)
+    methods: tuple[str, ...]
+    presets: tuple[str, ...]
     seeds: int = 3
     budget_s: float | None = None
     settings: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
     store_url: str | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _filled_in(cls, asked: Mapping[str, Any]) -> dict[str, Any]:
+        experiment = EXPERIMENTS.get(str(asked.get("experiment")), USUAL)
+        said = {name: value for name, value in asked.items() if value is not None}
+        settings = dict.fromkeys((*experiment.settings, *said.get("settings", ())))
+        from_experiment = {name: getattr(experiment, name) for name in _FROM_EXPERIMENT}
+        return {**from_experiment, **said, "settings": tuple(settings)}
+
+    @property
+    def compares(self) -> Experiment:
+        """The experiment, or the usual comparison."""
+        return USUAL if self.experiment is None else EXPERIMENTS[self.experiment]
 
     @cached_property
     def store(self) -> Store:
@@ -57,29 +78,17 @@ class BenchmarkRequest(BaseModel):
         return TargetConfig(targets=given) if given else TargetConfig()
 
     @cached_property
-    def names(self) -> dict[str, str]:
-        """What each scene is called: a folder by its last part, a synthetic one as written.
-
-        Raises InputError for a scene that is neither, and for two of one name.
-        """
-        names: dict[str, str] = {}
-        for scene in self.scenes:
-            name = Path(scene).resolve().name if _is_folder(scene) else named_scene(scene).name
-            if _is_folder(scene) and not Path(scene).is_dir():
-                raise InputError(
-                    "A scene is a folder or a synthetic one's name", repr(scene), "Check the path."
-                )
-            if name in names:
-                raise InputError(
-                    "Scenes of a benchmark have different names", repr(name), "Rename a folder."
-                )
-            names[name] = scene
-        return names
+    def asked_scenes(self) -> tuple[AskedScene, ...]:
+        """Raises InputError for a scene that is none, and for two of one name."""
+        return read_scenes(self.scenes)
 
     @property
     def command(self) -> str:
         """The command line that asks for the same."""
-        words = ["mocoflow", "benchmark", "--scenes", *self.scenes, "--methods", *self.methods]
+        words = ["mocoflow", "benchmark"]
+        words += ["--experiment", self.experiment] if self.experiment else []
+        words += ["--scenes", *self.scenes]
+        words += ["--methods", *self.methods] if self.methods else []
         words += ["--presets", *self.presets, "--seeds", str(self.seeds), "--out", str(self.out)]
         if self.budget_s is not None:
             words += ["--budget", f"{self.budget_s:g}"]
@@ -93,43 +102,73 @@ class BenchmarkRequest(BaseModel):
         """Take the output folder. Raises InputError for anything that no cell could run with."""
         self._check()
         begun = BenchmarkRecord(
-            settings=self.settings, budget_s=self.budget_s, command=self.command
+            experiment=self.experiment,
+            settings=self.settings,
+            budget_s=self.budget_s,
+            command=self.command,
         )
         return BenchmarkFolder.claim(self.out, begun)
 
     def cells(self) -> Iterator[Cell]:
         """Every scene with every preset, method that runs, and seed; scenes made when needed."""
-        for name, scene in self.names.items():
-            path = Path(scene) if _is_folder(scene) else demo_scene(scene)
+        for scene in self.asked_scenes:
             for preset in self.presets:
                 for method in self._running():
                     for seed in range(self.seeds):
-                        yield self._cell(name, path, preset, method, seed)
+                        yield self._cell(scene, preset, method, seed)
 
-    def _cell(self, name: str, path: Path, preset: str, method: str, seed: int) -> Cell:
-        folder = f"cells/{name}/{preset}/{method}/{seed}"
-        # Failed until it is known to have finished.
-        record = CellRecord(
-            scene=name, preset=preset, method=method, seed=seed, folder=folder, state="failed"
-        )
-        request = Request(
-            scene_path=path,
+    def shifted_scenes(self) -> Iterator[tuple[str, Request]]:
+        """The scenes whose photographs are scored misplaced, with what they are extracted by."""
+        for scene in self.asked_scenes if self.compares.shifts_views else ():
+            yield scene.name, self._request(scene, self.presets[0], (), 0)
+
+    def _request(
+        self, scene: AskedScene, preset: str, changes: tuple[str, ...], seed: int
+    ) -> Request:
+        return Request(
+            scene_path=scene.folder(),
             preset=preset,
             seed=seed,
             budget_s=self.budget_s,
-            settings=(*self.settings, *SETTINGS[method]),
+            settings=(*self.settings, *scene.settings, *changes),
             store_url=self.store_url,
         )
+
+    def _cell(self, scene: AskedScene, preset: str, method: str, seed: int) -> Cell:
+        folder = f"cells/{scene.name}/{preset}/{method}/{seed}"
+        refusal = self._refusal(preset, method)
+        record = CellRecord(
+            scene=scene.name,
+            preset=preset,
+            method=method,
+            seed=seed,
+            folder=folder,
+            # Failed until it is known to have finished.
+            state="refused" if refusal else "failed",
+            reason=str(refusal or ""),
+        )
+        request = self._request(scene, preset, SETTINGS[method], seed)
         return Cell(record, request, self.out / folder)
+
+    def _refusal(self, preset: str, method: str) -> InputError | None:
+        """Why a method makes no sense with a preset and the settings, if it does not."""
+        try:
+            require_method(method, PRESETS[preset](), self.settings)
+        except InputError as error:
+            return error
+        return None
 
     def _running(self) -> list[str]:
         """The methods that have runs of their own; the others are scored within those."""
         return [method for method in self.methods if method in SETTINGS]
 
     def _check(self) -> None:
+        if self.experiment is not None:
+            _all_known("--experiment", (self.experiment,), tuple(EXPERIMENTS))
         _all_known("--presets", self.presets, tuple(PRESETS))
         _all_known("--methods", self.methods, (*SETTINGS, *METHODS))
-        if not self._running() or not self.names or self.seeds < 1:
+        idle = not self._running() and not self.compares.shifts_views
+        if idle or not self.asked_scenes or self.seeds < 1:
             raise InputError(
                 "A benchmark has a scene, a seed, and a method that is run",
                 f"--scenes {' '.join(self.scenes)} --methods {' '.join(self.methods)} "
@@ -137,13 +176,11 @@ class BenchmarkRequest(BaseModel):
                 "posed_mesh alone is scored within the runs of another method.",
             )
         for preset in self.presets:
-            for method in self._running():
-                with_settings(PRESETS[preset](), (*self.settings, *SETTINGS[method]))
+            with_settings(PRESETS[preset](), self.settings)
+        refusals = [self._refusal(p, m) for p in self.presets for m in self._running()]
+        if refusals and all(refusals):
+            raise next(filter(None, refusals))
         _ = self.waited_for
-
-
-def _is_folder(scene: str) -> bool:
-    return "/" in scene or Path(scene).is_dir()
 
 
 def _all_known(option: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:

@@ -8,11 +8,16 @@ from typing import Annotated
 
 import typer
 
+from flows.finished_run import export, render
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
 
-# Written out: the presets themselves take torch, which takes a second.
+# Written out: presets and experiments themselves take torch, which takes a second.
+EXPERIMENT_HELP = (
+    "removal, progressive, misalignment, partial_observation, train_camera or worse_estimate: "
+    "scenes, methods and presets of the paper's, where they are not given."
+)
 PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(
@@ -141,16 +146,18 @@ def plan(
 
 @app.command(cls=ListOptions)
 def benchmark(
-    scenes: Annotated[
-        list[str], typer.Option(metavar="SCENE...", help="Folders, or synthetic scenes by name.")
-    ],
     out: Annotated[Path, typer.Option(help="New folder for the results.")],
+    experiment: Annotated[str | None, typer.Option(help=EXPERIMENT_HELP)] = None,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SCENE...", help="Folders, or synthetic scenes by name; @CAMERA."),
+    ] = None,
     methods: Annotated[
         list[str] | None,
         typer.Option(metavar="METHOD...", help="mocoflow, posed_mesh, without_consensus, ..."),
     ] = None,
     presets: Annotated[
-        list[str] | None, typer.Option(metavar="PRESET...", help="fast or toy.")
+        list[str] | None, typer.Option(metavar="PRESET...", help=PRESET_HELP)
     ] = None,
     seeds: Annotated[int, typer.Option(help="How many seeds, from 0.", min=1)] = 3,
     budget: Annotated[
@@ -170,10 +177,11 @@ def benchmark(
     from flows.benchmark_request import BenchmarkRequest
 
     request = BenchmarkRequest(
-        scenes=tuple(scenes),
+        experiment=experiment,
+        scenes=tuple(scenes) if scenes else None,
         out=out,
-        methods=tuple(methods or ("mocoflow", "posed_mesh")),
-        presets=tuple(presets or ("fast",)),
+        methods=tuple(methods) if methods else None,
+        presets=tuple(presets) if presets else None,
         seeds=seeds,
         budget_s=budget,
         settings=tuple(settings or ()),
@@ -186,8 +194,9 @@ def benchmark(
 
     with undisturbed():
         record = flow(
-            scenes=request.scenes,
             out=request.out,
+            experiment=request.experiment,
+            scenes=request.scenes,
             methods=request.methods,
             presets=request.presets,
             seeds=request.seeds,
@@ -200,59 +209,12 @@ def benchmark(
         if cell.state != "finished":
             typer.echo(f"{cell.name} {cell.state}: {cell.reason}", err=True)
     typer.echo(f"Benchmark: {request.out / 'benchmark.html'}")
-    if not any(cell.state == "finished" for cell in record.cells):
+    if record.cells and not any(cell.state == "finished" for cell in record.cells):
         sys.exit(1)
 
 
-@app.command()
-def render(
-    run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
-    out: Annotated[Path, typer.Option(help="An .mp4, one .png, or a folder of pictures.")],
-    camera: Annotated[str, typer.Option(help="Name of a camera of the run, or orbit.")] = "orbit",
-    frames: Annotated[str, typer.Option(help="Source numbers: 0,5,10-20.")] = "",
-    times: Annotated[str, typer.Option(help="Seconds from the first frame: 0.1,0.25.")] = "",
-    fps: Annotated[
-        float | None,
-        typer.Option(
-            help="Pictures per second of the whole clip; beside --frames or --times, of the video.",
-            min=0.1,
-        ),
-    ] = None,
-    background: Annotated[str, typer.Option(help="A colour or a picture.")] = "white",
-    rotate: Annotated[
-        str, typer.Option(help="Turns the person: X,Y,Z, world axis times radians.")
-    ] = "",
-    size: Annotated[int | None, typer.Option(help="Longer side in pixels.", min=16)] = None,
-) -> None:
-    """Render views of a finished run; the same command gives the same pictures."""
-    from flows.request import open_users_store
-    from flows.written_lists import read_numbers, read_ranges, read_vector
-    from mocoflow_core.artifacts import SceneArtifact
-    from mocoflow_core.io.run_folder import read_run
-    from mocoflow_core.methods.novel_views import ViewRequest, render_novel_views
-    from tasks.terminal_bar import terminal_bar
-
-    request = ViewRequest(
-        camera=camera,
-        frames=read_ranges(frames),
-        times_s=read_numbers(times),
-        fps=fps,
-        background=background,
-        rotate=read_vector(rotate),
-        longer_side_px=size,
-    )
-    record = read_run(run)
-    store = open_users_store(record.store)
-    trained = store.find(SceneArtifact, record.stage(SceneArtifact.stage).key)
-    if trained is None:
-        raise InputError(
-            f"The trained scene of {run} must be in {record.store}",
-            "nothing intact there",
-            "Run `mocoflow reconstruct` again with the same folder.",
-        )
-    with terminal_bar("render") as progress:
-        count = render_novel_views(record, store.folder(trained), request, out, progress)
-    typer.echo(f"{count} views: {out}")
+app.command()(render)
+app.command()(export)
 
 
 @app.command()

@@ -55,7 +55,8 @@ def prepare(request: Request) -> Preparation:
         masks=inspection.holds("mask_segmentation"),
         repeated_frames=chosen.plan.repeated_frames == "on",
     )
-    clip = extract_clip(where, request.recording, chosen.capture, needs)
+    turned = given if chosen.capture.least_shown > 0 else None
+    clip = extract_clip(where, request.recording, chosen.capture, needs, turned)
     bodies = given
     if inspection.holds("location_search"):
         bodies = locate_body(where, clip, given, chosen.location)

@@ -77,9 +77,13 @@ def reconstruct(
     clip, plan, bodies = prepared.clip, prepared.plan, prepared.bodies
     trained = optimise(request, prepared, spent_on(prepared.stages, machine))
 
-    evaluation = extract_evaluation(where, request.others, clip, chosen.capture)
+    least_shown = chosen.evaluation.least_shown
+    turned = prepared.given if least_shown > 0 else None
+    evaluation = extract_evaluation(
+        where, request.others, clip, chosen.capture, least_shown, turned
+    )
     views = render_views(
-        where, trained, clip, evaluation, bodies, chosen.evaluation, chosen.presentation
+        where, trained, plan, clip, evaluation, bodies, chosen.evaluation, chosen.presentation
     )
     name = request.scene.description.name
     scores = score_views(

@@ -11,6 +11,7 @@ from flows.stopping import read_target
 from flows.user_folders import cache_folder
 from mocoflow_core.capture.extract import select_training_frames
 from mocoflow_core.capture.scene import Scene, open_scene
+from mocoflow_core.contradictions import require_sense
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.remote_store import open_store
@@ -49,18 +50,24 @@ class Request(BaseModel):
 
     @cached_property
     def scene(self) -> Scene:
-        return open_scene(self.scene_path)
+        return open_scene(self.scene_path, self.configuration.capture.train_camera)
 
     @cached_property
     def configuration(self) -> Configuration:
-        """The preset with the settings, the budget and the score to reach applied."""
+        """The preset with the settings, the budget and the score to reach applied.
+
+        Raises InputError for settings that are unknown, contradict each other or are never read.
+        """
         if self.preset not in PRESETS:
             raise InputError(
                 f"--preset must be one of {', '.join(PRESETS)}", repr(self.preset), "Choose one."
             )
         budget = () if self.budget_s is None else (f"schedule.budget_s={self.budget_s}",)
         until = () if self.until is None else (read_target(self.until),)
-        return with_settings(PRESETS[self.preset](), (*self.settings, *budget, *until))
+        preset = PRESETS[self.preset]()
+        chosen = with_settings(preset, (*self.settings, *budget, *until))
+        require_sense(chosen, preset)
+        return chosen
 
     @cached_property
     def processes(self) -> Devices:

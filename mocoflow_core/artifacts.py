@@ -95,6 +95,12 @@ class ReportArtifact(Artifact):
     stage = "write_report"
 
 
+class MisplacedViewsArtifact(Artifact):
+    """A scene's photographs scored against themselves, moved and turned."""
+
+    stage = "misplace_views"
+
+
 class CellTablesArtifact(Artifact):
     """The tables of all cells of a benchmark."""
 

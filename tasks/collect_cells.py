@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import JsonValue
 
 from mocoflow_core.artifacts import CellTablesArtifact
 from mocoflow_core.methods.benchmark_folder import finished_cells
 from mocoflow_core.metrics import curve, table
 from mocoflow_core.metrics.benchmark_tables import gather, write_runs
+from mocoflow_core.metrics.misalignment import MisalignmentRow, write_misalignment
 from mocoflow_core.metrics.time_to_target import TargetConfig, times_to_targets, write_times
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Misplaced views.
 
 
 @stage(CellTablesArtifact, ALGORITHM_VERSION)
@@ -22,10 +25,12 @@ def collect_cells(
     cells: list[dict[str, JsonValue]],
     methods: list[str],
     targets: TargetConfig,
+    misplaced: list[dict[str, Any]],
 ) -> Summary:
-    """Scores and error curves of the cells that finished.
+    """Scores and error curves of the cells that finished; rows of views that were misplaced.
 
-    Output: ``scores.parquet``, ``error_curve.parquet``, ``time_to_target.parquet``. Seconds.
+    Output: ``scores.parquet``, ``error_curve.parquet``, ``time_to_target.parquet``,
+    ``misalignment.parquet``. Seconds.
     """
     finished = finished_cells(cells, folder.path)
     scores = gather(finished, methods, table.read_scores, "scores.parquet")
@@ -34,4 +39,6 @@ def collect_cells(
     write_runs(curves, curve.SCHEMA, work.folder / "error_curve.parquet")
     times = times_to_targets(curves, targets.targets)
     write_times(times, work.folder / "time_to_target.parquet")
+    rows = [MisalignmentRow(**row) for row in misplaced]
+    write_misalignment(rows, work.folder / "misalignment.parquet")
     return {"contenders": len(scores)}

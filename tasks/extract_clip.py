@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mocoflow_core.artifacts import ClipArtifact
+from mocoflow_core.artifacts import ClipArtifact, MeshArtifact
+from mocoflow_core.body.facing import frames_that_show, turned_away_warning
 from mocoflow_core.capture import extract
 from mocoflow_core.capture.extract import CaptureConfig, ClipNeeds
 from mocoflow_core.capture.scene import open_scene
@@ -15,20 +16,29 @@ ALGORITHM_VERSION = 2  # Broken and repeated frames are left out, silent masks n
 
 @stage(ClipArtifact, ALGORITHM_VERSION)
 def extract_clip(
-    work: Stage, recording: Source, capture: CaptureConfig, needs: ClipNeeds
+    work: Stage,
+    recording: Source,
+    capture: CaptureConfig,
+    needs: ClipNeeds,
+    bodies: MeshArtifact | None = None,
 ) -> Summary:
     """Frames, masks, background and camera of the train side (MoCo-Flow sec. 4, data).
 
+    With ``bodies`` only the frames whose body is turned as ``capture.least_shown`` asks for.
     Output: ``clip.json`` and an ``.npy`` file for each array of the clip. A few seconds.
     """
-    scene = open_scene(recording.path)
-    extracted = extract.extract_clip(scene, capture, needs)
+    scene = open_scene(recording.path, recording.train_camera)
+    only = bodies and frames_that_show(work.open(bodies), scene, capture.least_shown)
+    extracted = extract.extract_clip(scene, capture, needs, only)
     clip, warnings = sound_clip(extracted, capture.difference_threshold)
+    selected, every = (
+        len(extract.select_training_frames(scene, capture, some).all) for some in (only, None)
+    )
+    away = turned_away_warning(selected, every, capture.least_shown)
     clip.save(work.folder)
     return {
         "frames": len(clip.frame_indices),
-        "repeated": len(extract.select_training_frames(scene, capture).all)
-        - len(extracted.frame_indices),
+        "repeated": selected - len(extracted.frame_indices),
         "held_out": int(clip.held_out.sum()),
         "first_frame": int(clip.frame_indices[0]),
         "last_frame": int(clip.frame_indices[-1]),
@@ -36,5 +46,5 @@ def extract_clip(
         "source_fps": scene.description.fps,
         "up": scene.up.tolist(),
         "camera": {"name": clip.camera.name, **clip.camera.to_json()},
-        "warnings": list(warnings),
+        "warnings": [*warnings, *away],
     }

@@ -17,7 +17,8 @@ def ingest_meshes(work: Stage, recording: Source, meshes: Source | None) -> Summ
 
     Output: ``meshes.npz`` and ``ingested.json``. Below a second.
     """
-    ingested = ingest.ingest_meshes(open_scene(recording.path), meshes.path if meshes else None)
+    scene = open_scene(recording.path, recording.train_camera)
+    ingested = ingest.ingest_meshes(scene, meshes.path if meshes else None)
     ingested.save(work.folder)
     return {
         "coordinates": ingested.coordinates,

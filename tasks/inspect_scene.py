@@ -23,7 +23,7 @@ def inspect_scene(
     Output: ``inspection.json``. A second or two.
     """
     ingested = IngestedMeshes.load(work.open(meshes))
-    found = inspection.inspect_scene(open_scene(recording.path), ingested)
+    found = inspection.inspect_scene(open_scene(recording.path, recording.train_camera), ingested)
     (work.folder / "inspection.json").write_text(found.model_dump_json(indent=1))
     decided = decide_preparation(found, plan)
     return {

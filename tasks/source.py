@@ -12,12 +12,16 @@ from mocoflow_core.io.content_key import digest_document, digest_file, digest_fi
 
 
 class Source(BaseModel):
-    """Where files lie now, and the digest of what they say."""
+    """Where files lie now, and the digest of what they say.
+
+    ``train_camera`` is the scene's, where it is one; the digest knows it.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     path: Path
     digest: str
+    train_camera: str | None = None
 
 
 def clip_source(scene: Scene) -> Source:
@@ -48,4 +52,4 @@ def folder_source(folder: Path, names: Iterable[str]) -> Source:
 def _source(scene: Scene, description: dict[str, object], files: list[Path]) -> Source:
     contents = {str(file.relative_to(scene.root)): digest_file(file) for file in files}
     digest = digest_document({"description": description, "files": contents})
-    return Source(path=scene.root, digest=digest)
+    return Source(path=scene.root, digest=digest, train_camera=scene.train_camera)

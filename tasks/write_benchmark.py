@@ -6,15 +6,19 @@ from pydantic import JsonValue
 
 from mocoflow_core.artifacts import BenchmarkArtifact, CellTablesArtifact
 from mocoflow_core.methods.benchmark_folder import CellRecord
+from mocoflow_core.methods.experiments import EXPERIMENTS, USUAL
 from mocoflow_core.metrics.benchmark_tables import read_runs
 from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.misalignment import read_misalignment
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import read_times
 from mocoflow_core.report.benchmark_chart import write_benchmark_chart
-from mocoflow_core.report.benchmark_page import BenchmarkResults, write_benchmark_page
+from mocoflow_core.report.benchmark_page import write_benchmark_page
+from mocoflow_core.report.benchmark_results import BenchmarkResults
+from mocoflow_core.report.markdown_tables import write_markdown_tables
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Experiments; tables as Markdown.
 
 
 @stage(BenchmarkArtifact, ALGORITHM_VERSION)
@@ -23,10 +27,12 @@ def write_benchmark(
     tables: CellTablesArtifact,
     cells: list[dict[str, JsonValue]],
     command: str,
+    experiment: str | None,
 ) -> Summary:
     """Error against run time with median and range, scores, time to target, omissions, machine.
 
-    Output: ``benchmark.html``, and ``error_against_time.png`` where a cell finished. Seconds.
+    Output: ``benchmark.html``, ``table.md``, and ``error_against_time.png`` where a cell finished.
+    Seconds.
     """
     held = work.open(tables)
     results = BenchmarkResults(
@@ -34,9 +40,12 @@ def write_benchmark(
         scores=read_runs(ScoreRow, held / "scores.parquet"),
         curves=read_runs(CurveRow, held / "error_curve.parquet"),
         times=read_times(held / "time_to_target.parquet"),
+        misplaced=read_misalignment(held / "misalignment.parquet"),
+        experiment=USUAL if experiment is None else EXPERIMENTS[experiment],
     )
     write_benchmark_chart(results.curves, work.folder / "error_against_time.png")
     write_benchmark_page(results, command, work.folder / "benchmark.html")
+    write_markdown_tables(results, command, work.folder / "table.md")
     return {
         "summary": results.summary_records(),
         "omissions": [omission._asdict() for omission in results.omissions()],

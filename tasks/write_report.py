@@ -18,7 +18,7 @@ from mocoflow_core.report.inputs import ReportInputs
 from mocoflow_core.report.page import write_report as write
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Says which train pixels drew the curve.
+ALGORITHM_VERSION = 3  # Shows correspondences.
 
 
 @stage(ReportArtifact, ALGORITHM_VERSION)
@@ -48,6 +48,8 @@ def write_report(
         baseline_views=rendered / "posed_mesh" / "views",
         novel_camera=str(views.summary["side_view"]),
         novel_view=rendered / "side",
+        correspondences=rendered / "correspondences",
+        canonical_frame=views.summary["canonical_frame"],
         turntable=rendered / "turntable.mp4",
         warnings=[str(warning) for warning in run.values.get("warnings", ())],
         guard_events=[str(event) for event in trained.summary["events"]],

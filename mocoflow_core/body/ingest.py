@@ -71,7 +71,7 @@ def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> Ingested
     from the scene. Frames missing inside are interpolated when the gap is short, with a warning.
 
     Raises InputError for a file that is no mesh sequence, non-finite vertices, another frame
-    count, another unit.
+    count, another unit; and for the scene's own meshes in the axes of another train camera.
     """
     path = meshes_override or scene.meshes()
     if path is None or not path.is_file():
@@ -91,6 +91,7 @@ def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> Ingested
     joined, gap_warnings = _joined(replace(raw, faces=faces), expected)
     root_centred = description.coordinates == "camera-root-centred"
     located = description.located and not root_centred
+    camera_warnings = _of_another_camera(scene, path, description)
     camera = scene.cameras[scene.train_camera]
     if description.coordinates == "camera":
         world = camera.to_world(joined.vertices.astype(np.float64))
@@ -102,7 +103,26 @@ def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> Ingested
         joined,
         "camera-root-centred" if root_centred else "world",
         located,
-        face_warnings + gap_warnings + check_frozen(raw) + check_turns(raw),
+        face_warnings + gap_warnings + camera_warnings + check_frozen(raw) + check_turns(raw),
+    )
+
+
+def _of_another_camera(scene: Scene, path: Path, description: MeshesDescription) -> tuple[str, ...]:
+    """What to know of meshes that were given for a camera that is now one of the others.
+
+    Raises InputError where they stand in that camera's axes.
+    """
+    if path != scene.meshes() or not scene.is_seen_from_elsewhere:
+        return ()
+    if description.coordinates != "world":
+        raise InputError(
+            f"meshes for {scene.train_camera}, or in world coordinates",
+            f"those of the scene, in the axes of {scene.meshes_for}",
+            f"Give an estimate made from {scene.train_camera} with --meshes.",
+        )
+    return (
+        f"the meshes were given for {scene.meshes_for}, which now evaluates: if they were "
+        "estimated from its pictures, its scores are not those of unseen views",
     )
 
 

@@ -29,6 +29,9 @@ Masks = NDArray[np.bool_]
 class CaptureConfig(ConfigurationPart):
     """How frames are taken from the files."""
 
+    train_camera: str | None = Field(
+        None, description="Camera to learn from; null: the one that scene.json names."
+    )
     fps: float = Field(12.0, gt=0, description="Working rate; the paper reduces to 12 (sec. 4).")
     max_side: int = Field(512, ge=16, description="Longer side of working frames, pixels.")
     held_out_frames: int = Field(
@@ -36,6 +39,13 @@ class CaptureConfig(ConfigurationPart):
     )
     holdout_every: int = Field(
         0, ge=0, description="Keep every n-th working frame for scoring where none lies between."
+    )
+    least_shown: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="Frames that show less of the surface that faces the camera in the first "
+        "frame are not looked at (the paper's partial observation); 0: all are.",
     )
     background_margin: float = Field(
         0.015, ge=0, le=0.2, description="Growth of masks for the plate, share of the longer side."
@@ -60,14 +70,20 @@ AS_FILES_SAY = ClipNeeds()
 
 
 def extract_clip(
-    scene: Scene, configuration: CaptureConfig, needs: ClipNeeds = AS_FILES_SAY
+    scene: Scene,
+    configuration: CaptureConfig,
+    needs: ClipNeeds = AS_FILES_SAY,
+    only: Indices | None = None,
 ) -> Clip:
     """The train camera's clip. No other camera and no truth is looked at.
+
+    Args:
+        only: source numbers beside which no frame is looked at.
 
     Raises InputError when frames or masks are missing, when sizes disagree, and when there are
     neither masks nor a background plate.
     """
-    selection = select_training_frames(scene, configuration)
+    selection = select_training_frames(scene, configuration, only)
     clip = extract_camera(scene, scene.train_camera, selection, configuration, needs)
     if not needs.repeated_frames:
         clip = clip.at_rows(~repeated_frames(clip.frames, clip.masks, ~clip.held_out))
@@ -81,13 +97,19 @@ def extract_clip(
 
 
 def extract_evaluation(
-    scene: Scene, frame_indices: Indices, configuration: CaptureConfig
+    scene: Scene,
+    frame_indices: Indices,
+    configuration: CaptureConfig,
+    only: Indices | None = None,
 ) -> list[Clip]:
     """The other cameras' clips: those of the given frames that have a mask to score against.
 
-    A camera without any such frame is left out. All frames count as held out.
+    Only those among ``only``, where it is given. A camera without any such frame is left out. All
+    frames count as held out.
     """
     clips = []
+    if only is not None:
+        frame_indices = np.intersect1d(frame_indices, only).astype(np.int32)
     for name in scene.evaluation_cameras:
         masked = np.array(sorted(scene.masks(name)), np.int32)
         scored = np.intersect1d(np.intersect1d(frame_indices, masked), scene.frames(name).indices)
@@ -97,8 +119,13 @@ def extract_evaluation(
     return clips
 
 
-def select_training_frames(scene: Scene, configuration: CaptureConfig) -> FrameSelection:
-    """The train camera's working and held-out frames, checked to be there with their masks."""
+def select_training_frames(
+    scene: Scene, configuration: CaptureConfig, only: Indices | None = None
+) -> FrameSelection:
+    """The train camera's working and held-out frames, checked to be there with their masks.
+
+    ``only``: source numbers beside which none is selected.
+    """
     name = scene.train_camera
     available = scene.frames(name).indices
     require_contiguous(available, f"frames of {name}")
@@ -124,7 +151,7 @@ def select_training_frames(scene: Scene, configuration: CaptureConfig) -> FrameS
             f"none for frame {unmasked[0]} ({len(unmasked)} missing)",
             "Add the masks, all black where the person is out of sight.",
         )
-    return selection
+    return selection if only is None else selection.among(only)
 
 
 def extract_camera(

@@ -27,6 +27,11 @@ class FrameSelection:
     def all(self) -> Indices:
         return np.union1d(self.working, self.held_out).astype(np.int32)
 
+    def among(self, frames: Indices) -> FrameSelection:
+        """Those that are also among the given source numbers."""
+        working, held_out = (part[np.isin(part, frames)] for part in (self.working, self.held_out))
+        return FrameSelection(working, held_out, self.fps)
+
 
 def select_frames(
     available: Indices,

@@ -36,10 +36,17 @@ class Scene:
     root: Path
     description: SceneDescription
     cameras: dict[str, Camera]  # at the size of the files, distortion included
+    train_camera: str  # the description's, or another one that was asked for
 
     @property
-    def train_camera(self) -> str:
+    def meshes_for(self) -> str:
+        """The camera that the scene's own meshes were given for."""
         return self.description.train_camera
+
+    @property
+    def is_seen_from_elsewhere(self) -> bool:
+        """Whether another camera than the description's is trained on."""
+        return self.train_camera != self.meshes_for
 
     @property
     def evaluation_cameras(self) -> list[str]:
@@ -79,7 +86,9 @@ class Scene:
             mode="json", include={"format", "version", "fps", "world", "train_camera", "meshes"}
         )
         camera = self.description.cameras[self.train_camera]
-        return {**values, "camera": camera.model_dump(mode="json")}
+        values |= {"train_camera": self.train_camera, "camera": camera.model_dump(mode="json")}
+        # What was estimated for another camera is known to be so.
+        return values | ({"meshes_for": self.meshes_for} if self.is_seen_from_elsewhere else {})
 
     def evaluation_description(self) -> dict[str, Any]:
         """The rest that scores depend on: the other cameras and the truth."""
@@ -109,8 +118,11 @@ class Scene:
         return files + ([background] if background else [])
 
 
-def open_scene(path: Path) -> Scene:
+def open_scene(path: Path, train_camera: str | None = None) -> Scene:
     """Read and validate ``scene.json`` of a folder (or given itself).
+
+    Args:
+        train_camera: another camera to train on; the description's then is one that evaluates.
 
     Raises InputError for an unreadable description, a matrix that is no rotation, non-finite
     values or impossible intrinsics, and for files that are named but not there.
@@ -121,14 +133,15 @@ def open_scene(path: Path) -> Scene:
             "a scene folder with a scene.json", f"{path}", "Check the path of the scene."
         )
     description = read_description(file)
-    if description.train_camera not in description.cameras:
-        raise InputError(
-            "train_camera must be one of the scene's cameras",
-            f"{description.train_camera!r} among {', '.join(description.cameras)}",
-            "Correct train_camera in scene.json.",
-        )
+    for name in (description.train_camera, train_camera or description.train_camera):
+        if name not in description.cameras:
+            raise InputError(
+                "train_camera must be one of the scene's cameras",
+                f"{name!r} among {', '.join(description.cameras)}",
+                f"Correct {'scene.json' if name != train_camera else 'capture.train_camera'}.",
+            )
     cameras = {name: _camera(name, part) for name, part in description.cameras.items()}
-    scene = Scene(file.parent, description, cameras)
+    scene = Scene(file.parent, description, cameras, train_camera or description.train_camera)
     _require_files(scene)
     return scene
 

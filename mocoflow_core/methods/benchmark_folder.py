@@ -30,8 +30,8 @@ class CellRecord(BaseModel):
     method: str
     seed: int
     folder: str  # in the benchmark's folder
-    state: Literal["finished", "failed", "cancelled"]
-    reason: str = ""  # why it did not finish
+    state: Literal["finished", "failed", "cancelled", "refused"]
+    reason: str = ""  # why it did not finish, or was not begun: its settings make no sense
     train_camera: str = ""
     wall_s: float | None = None
     cpu_s: float | None = None
@@ -69,6 +69,7 @@ class BenchmarkRecord(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    experiment: str | None = None
     settings: tuple[str, ...]
     budget_s: float | None
     command: str

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor
 from pydantic import BaseModel, ConfigDict
 
-from mocoflow_core.capture.frame_selection import select_frames
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.orbit import moved_around
@@ -21,6 +20,7 @@ from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.io.video import write_video
 from mocoflow_core.methods.presentation import orbit
 from mocoflow_core.methods.rendered_views import Progress
+from mocoflow_core.methods.run_clip import RunClip
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.threads import torch_threads
 
@@ -69,7 +69,7 @@ def render_novel_views(
     # More than one thread only where the optimisation has measured that it pays.
     with torch_threads(1), full_disk_is_bad_input(str(out)):
         pictures = _pictures(scene, shots, background, progress)
-        _write(pictures, len(shots), out, request.fps or _clip(run)["fps"])
+        _write(pictures, len(shots), out, request.fps or RunClip.of(run).fps)
     return len(shots)
 
 
@@ -98,11 +98,12 @@ def _pictures(
 
 
 def _shots(run: RunRecord, scene: TrainedScene, request: ViewRequest) -> list[Shot]:
-    moments = _moments(run, request)
+    clip = RunClip.of(run)
+    moments = _moments(clip, request)
     times = np.array([time for _, time in moments])
     if request.camera == ORBIT:
         first = _camera(run, run.train_camera, request.longer_side_px)
-        cameras = list(orbit(scene, first, _up(run), times))
+        cameras = list(orbit(scene, first, clip.up, times))
     else:
         cameras = [_camera(run, request.camera, request.longer_side_px)] * len(moments)
     if request.rotate is not None:
@@ -134,35 +135,18 @@ def _is_video(out: Path) -> bool:
     return out.suffix.lower() in VIDEO_SUFFIXES
 
 
-def _moments(run: RunRecord, request: ViewRequest) -> list[tuple[int, float]]:
+def _moments(clip: RunClip, request: ViewRequest) -> list[tuple[int, float]]:
     """Numbers for the files, and normalised times."""
-    clip = _clip(run)
-    first, last, source_fps = clip["first_frame"], clip["last_frame"], clip["source_fps"]
-    duration_s = (last - first) / source_fps
     if request.times_s:
-        found = [(number, s / max(duration_s, 1e-9)) for number, s in enumerate(request.times_s)]
+        found = [(row, clip.time_of_second(s)) for row, s in enumerate(request.times_s)]
     elif request.frames or request.fps is None:
-        frames = request.frames or _at_working_rate(clip)
-        found = [(frame, (frame - first) / max(last - first, 1)) for frame in frames]
+        frames = request.frames or clip.working_frames()
+        found = [(frame, clip.time(frame)) for frame in frames]
     else:
-        count = int(duration_s * request.fps) + 1
-        found = [(number, number / request.fps / max(duration_s, 1e-9)) for number in range(count)]
-    outside = [time for _, time in found if not -1e-9 <= time <= 1.0 + 1e-9]
-    if outside:
-        raise InputError(
-            f"Times must lie in the clip: frames {first:g} to {last:g}, 0 to {duration_s:g} s",
-            f"{first + outside[0] * (last - first):g} as a frame",
-            "Choose times inside.",
-        )
+        count = int(clip.duration_s * request.fps) + 1
+        found = [(row, clip.time_of_second(row / request.fps)) for row in range(count)]
+    clip.require_inside(time for _, time in found)
     return found
-
-
-def _at_working_rate(clip: dict[str, float]) -> tuple[int, ...]:
-    """Frames as they were selected for training, those that repeat another among them."""
-    filmed = np.arange(int(clip["first_frame"]), int(clip["last_frame"]) + 1, dtype=np.int32)
-    none = np.empty(0, np.int32)
-    selection = select_frames(filmed, clip["source_fps"], clip["fps"], none, 0, 0)
-    return tuple(int(frame) for frame in selection.working)
 
 
 def _camera(run: RunRecord, name: str, longer_side_px: int | None) -> Camera:
@@ -190,12 +174,3 @@ def _background(name: str, camera: Camera) -> NDArray[np.float32]:
             "--background must be a colour or a picture", repr(name), "Try white or #204060."
         ) from error
     return np.broadcast_to(np.asarray(colour, np.float32) / 255.0, size).copy()
-
-
-def _clip(run: RunRecord) -> dict[str, float]:
-    names = ("fps", "source_fps", "first_frame", "last_frame")
-    return {name: float(run.capture[name]) for name in names}  # type: ignore[arg-type]
-
-
-def _up(run: RunRecord) -> NDArray[np.float64]:
-    return np.asarray(run.capture["up"], np.float64)

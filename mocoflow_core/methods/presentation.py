@@ -24,6 +24,9 @@ class PresentationConfig(ConfigurationPart):
 
     side_deg: float = Field(90.0, description="The novel view: so far around the body, degrees.")
     turntable_views: int = Field(36, ge=2, description="Pictures of one full turn.")
+    correspondence_frames: int = Field(
+        5, ge=1, description="Frames whose points are coloured, besides the canonical one."
+    )
     turntable_fps: float = Field(12.0, gt=0, description="Pictures per second of the turntable.")
 
 

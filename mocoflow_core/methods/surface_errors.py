@@ -42,7 +42,7 @@ def surface_rows(
         seen = {
             "mocoflow": surface_points(
                 renderer.scene, view.camera, renderer.time(view.frame_index)
-            ),
+            ).points,
             "posed_mesh": points_on_mesh(raster, view.camera),
         }
         for method, points in seen.items():

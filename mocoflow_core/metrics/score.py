@@ -36,6 +36,13 @@ class EvaluationConfig(ConfigurationPart):
     frames_per_camera: int = Field(
         12, ge=1, description="Scored frames of each camera at the end, evenly spread in time."
     )
+    least_shown: float = Field(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description="Frames of other cameras are scored where the train camera sees so much of "
+        "the surface that faced it in the first frame; 0: all are.",
+    )
     curve_views: int = Field(
         8, ge=1, description="Views scored at each point of the error curve, drawn once by seed."
     )

@@ -20,7 +20,7 @@ from mocoflow_core.planning.visibility import unseen_share
 Representation = Literal["hybrid", "networks"]
 
 # Decisions that only one of the representations asks for.
-_ONLY = {
+OWN_DECISIONS = {
     "hybrid": ("motion_residual", "fixed_light", "wide_shell", "fine_detail"),
     "networks": ("initialisation", "adaptive_box"),
 }
@@ -98,7 +98,7 @@ def _canonical_frame(clip: Clip, posed: MeshSequence, configuration: PlanConfig)
 
 
 def _require_own_decisions(configuration: PlanConfig, representation: Representation) -> None:
-    for other, names in _ONLY.items():
+    for other, names in OWN_DECISIONS.items():
         forced = [name for name in names if getattr(configuration, name) != "auto"]
         if other != representation and forced:
             raise InputError(

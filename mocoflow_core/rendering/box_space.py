@@ -13,6 +13,7 @@ from torch import Tensor
 from mocoflow_core.fields.network_field import NetworkField
 from mocoflow_core.fields.network_shape import NetworkShape
 from mocoflow_core.rendering.box_scene import BoxScene
+from mocoflow_core.rendering.canonical_scene import BoxCanonical
 from mocoflow_core.rendering.frame_box import FrameBoxes
 
 _FILE = "canonical.safetensors"
@@ -38,6 +39,11 @@ class BoxSpace:
     def at(self, field: NetworkField, times: Tensor) -> BoxScene:
         shape = self.shape
         return BoxScene(field, self.boxes.at(times), shape.coarse_samples, shape.fine_samples)
+
+    def canonical(self, field: NetworkField) -> BoxCanonical:
+        half_longest_m = 0.5 * float(np.ptp(self._vertices, axis=0).max())
+        step_m = self.boxes.mean_depth_m / self.shape.coarse_samples
+        return BoxCanonical(field, self._vertices, self.shape.radius_m - half_longest_m, step_m)
 
     def centre_at(self, time: float) -> NDArray[np.float64]:
         """Middle of the box, (3,) world metres."""

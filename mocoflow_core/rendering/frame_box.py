@@ -62,6 +62,11 @@ class FrameBoxes:
         middle = 0.5 * (self.lower[row] + self.upper[row])
         return (middle @ self.rotation).double().numpy()
 
+    @property
+    def mean_depth_m(self) -> float:
+        """How long the boxes are along the view, on average."""
+        return float((self.upper - self.lower)[:, 2].mean())
+
     def save(self, folder: Path) -> None:
         named = {name: part.contiguous() for name, part in vars(self).items()}
         save_file(named, folder / _FILE)

@@ -13,6 +13,7 @@ from torch import Tensor
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.rays import Rays
+from mocoflow_core.rendering.canonical_scene import CanonicalScene
 from mocoflow_core.rendering.pixels import VisiblePixels
 from mocoflow_core.rendering.sampling import PackedSamples
 
@@ -80,6 +81,9 @@ class Space(Protocol[Field]):
 
     def at(self, field: Field, times: Tensor) -> PosedScene:
         """The scene at normalised times (G,); what they need is prepared once and kept."""
+
+    def canonical(self, field: Field) -> CanonicalScene:
+        """The scene at no moment: density and colour of canonical space."""
 
     def centre_at(self, time: float) -> NDArray[np.float64]:
         """About the middle of the body at a normalised time, (3,) world metres."""

@@ -14,6 +14,7 @@ from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.scene_shape import SceneShape
+from mocoflow_core.rendering.canonical_scene import ShellCanonical
 from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.rendering.shell_scene import ShellScene
 
@@ -56,6 +57,9 @@ class ShellSpace:
     def at_training_frames(self, field: HybridField, body: BodyMotion) -> ShellScene:
         """The scene at the training frames, whose tables were made when the motion was fitted."""
         return ShellScene(field, body, self.shape.shell_width_m, self.sampling)
+
+    def canonical(self, field: HybridField) -> ShellCanonical:
+        return ShellCanonical(field, self.canonical_vertices, self.shape.shell_width_m)
 
     def centre_at(self, time: float) -> NDArray[np.float64]:
         """Mean of the body's control points, (3,) world metres."""

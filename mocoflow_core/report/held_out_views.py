@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.metrics.crop import Crop, bounding_box
 from mocoflow_core.metrics.score import on_white
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.report.inputs import BASELINE, ReportInputs
 from mocoflow_core.report.metric_labels import VIEW_METRICS
 from mocoflow_core.report.pictures import (
     Picture,
+    cut_to_person,
     data_uri,
     difference_picture,
     read_picture,
@@ -24,8 +24,6 @@ from mocoflow_core.report.pictures import (
 )
 
 BUDGET_BYTES = 5_000_000
-NEARLY_WHITE = 250
-MARGIN = 0.06  # of the window's longer side
 CAPTION_METRICS = ("psnr_union", "ssim", "mask_iou")
 
 # (method, camera, frame) -> metric -> value
@@ -96,31 +94,8 @@ def _sheet(inputs: ReportInputs, clip: Clip) -> _Sheet:
         if compared:
             pictures.append(read_picture(_file(inputs.baseline_views, name, index)))  # type: ignore[arg-type]
         rows.append(pictures)
-    rows = _cut_to_person(rows)
+    rows = cut_to_person(rows)
     return _Sheet(name, columns, [int(i) for i in clip.frame_indices[chosen]], rows)
-
-
-def _cut_to_person(rows: list[list[Picture]]) -> list[list[Picture]]:
-    """Windows of one size, each around what photograph and render of its moment show."""
-    inked = [np.minimum(*row[:2]).min(axis=-1) < NEARLY_WHITE for row in rows]
-    boxes = [bounding_box(ink) if ink.any() else (0, 0, *ink.shape) for ink in inked]
-    height = max((bottom - top for top, _, bottom, _ in boxes), default=0)
-    width = max((right - left for _, left, _, right in boxes), default=0)
-    spare = round(MARGIN * max(height, width))
-    size = (height + spare, width + spare)
-    return [
-        [_window(picture, box, size) for picture in row]
-        for row, box in zip(rows, boxes, strict=True)
-    ]
-
-
-def _window(picture: Picture, box: tuple[int, int, int, int], size: tuple[int, int]) -> Picture:
-    """A part of the picture around the middle of a box, white beyond the picture's border."""
-    side = max(size)
-    row, column = (box[0] + box[2] - side) // 2, (box[1] + box[3] - side) // 2
-    square = Crop(row, column, side).of(picture, 255)
-    top, left = (side - size[0]) // 2, (side - size[1]) // 2
-    return square[top : top + size[0], left : left + size[1]]  # type: ignore[return-value]
 
 
 def _file(folder: Path | None, camera: str, frame_index: int) -> Path | None:

@@ -33,6 +33,8 @@ class ReportInputs:
     baseline_views: Path | None = None  # the same of the posed mesh
     novel_camera: str = ""  # whose side the novel view shows
     novel_view: Path | None = None  # %06d.png, one for each frame of the train clip
+    correspondences: Path | None = None  # %06d.png of frames of the train clip
+    canonical_frame: int | None = None  # source number
     turntable: Path | None = None  # an H.264 mp4
     warnings: Sequence[str] = ()
     guard_events: Sequence[str] = ()  # steps refused, states restored

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from mocoflow_core.methods.ablations import ABLATIONS
+from mocoflow_core.methods.ablations import change_of, compared_with
 from mocoflow_core.methods.benchmark_folder import CellRecord
-from mocoflow_core.metrics.benchmark_tables import RUN_METHOD, Contender, Runs
+from mocoflow_core.metrics.benchmark_tables import Contender, Runs
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import TimeToTarget
 from mocoflow_core.report.metric_labels import label_of
@@ -45,10 +45,13 @@ def _unfinished(cells: Iterable[CellRecord]) -> list[Omission]:
 
 
 def _changed_nothing(contender: Contender, scores: Runs[ScoreRow]) -> bool:
-    """Whether an ablation has the very scores of the whole method, in every seed."""
-    whole, ours = scores.get(contender._replace(method=RUN_METHOD), {}), scores[contender]
+    """Whether a method has the very scores of the one it differs from, in every seed."""
+    other = compared_with(contender.method)
+    if other is None:
+        return False
+    whole, ours = scores.get(contender._replace(method=other), {}), scores[contender]
     common = whole.keys() & ours.keys()
-    if contender.method not in ABLATIONS or not common:
+    if not common:
         return False
     return all(_numbers(ours[seed]) == _numbers(whole[seed]) for seed in common)
 
@@ -59,8 +62,8 @@ def _numbers(rows: Iterable[ScoreRow]) -> list[str]:
 
 
 def _same(contender: Contender) -> str:
-    removes = ABLATIONS[contender.method].removes
-    return f"the very scores of {RUN_METHOD}: this scene makes no use of {removes}"
+    other, change = compared_with(contender.method), change_of(contender.method)
+    return f"the very scores of {other}: on this scene nothing comes of {change}"
 
 
 def _never_reached(times: Sequence[TimeToTarget]) -> list[Omission]:

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from mocoflow_core.metrics.curve import read_curve, training_spans
 from mocoflow_core.metrics.table import ScoreRow, mean_scores, read_scores
 from mocoflow_core.report import videos
+from mocoflow_core.report.correspondences import correspondences
 from mocoflow_core.report.curve_plot import plot_curve, svg_of
 from mocoflow_core.report.held_out_views import held_out_views
 from mocoflow_core.report.inputs import BASELINE, ReportInputs
@@ -61,6 +62,7 @@ def _context(inputs: ReportInputs) -> dict[str, Any]:
         "novel_camera": inputs.novel_camera,
         "turntable": turntable,
         "cameras": held_out_views(inputs, rows),
+        "correspondences": correspondences(inputs),
         "table": view_table(rows, inputs.train_camera),
         "repairs": repairs(rows, inputs.method),
         "curve": _curve(inputs, rows),

@@ -50,6 +50,18 @@ def test_world_meshes_stay_where_they_are(folder):
     assert (result.coordinates, result.located, result.warnings) == ("world", True, ())
 
 
+def test_meshes_for_another_camera_are_said_to_be_or_refused_in_its_axes(folder, tmp_path):
+    [warning] = ingest_meshes(open_scene(folder, "cam01")).warnings
+    assert "given for cam00" in warning
+    own = tmp_path / "own.npz"
+    MESHES.save(own)
+    assert ingest_meshes(open_scene(folder, "cam01"), own).warnings == ()
+    for coordinates in ("camera", "camera-root-centred"):
+        edit_description(folder, lambda d, c=coordinates: d["meshes"].update(coordinates=c))
+        with pytest.raises(InputError, match="axes of cam00"):
+            ingest_meshes(open_scene(folder, "cam01"))
+
+
 def test_camera_meshes_are_brought_to_the_world(folder):
     camera = default_recipe().cameras["cam00"]
     in_camera = camera.to_camera(MESHES.vertices.astype(float)).astype(np.float32)

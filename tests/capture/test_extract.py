@@ -102,6 +102,24 @@ def test_a_higher_source_rate_gives_held_out_frames_between(tmp_path):
     assert clip.fps == 12
 
 
+def test_frames_that_are_not_among_those_to_be_looked_at_leave_no_trace(tmp_path):
+    recipe = replace(default_recipe(frames=21), fps=48.0, background=False)
+    folder = write_scene(tmp_path, recipe)
+    only = np.arange(0, 11, dtype=np.int32)
+
+    def partly() -> Clip:
+        return extract_clip(open_scene(folder), CaptureConfig(), only=only)
+
+    before = partly()
+    assert before.frame_indices.tolist() == [0, 2, 4, 6, 8, 10]
+    for index in range(11, 21):
+        noise = np.random.default_rng(index).integers(0, 256, (96, 64, 3))
+        Image.fromarray(noise.astype(np.uint8)).save(folder / f"frames/cam00/{index:06d}.png")
+    assert pixels(partly()) == pixels(before)
+    [others] = extract_evaluation(open_scene(folder), np.arange(21), CaptureConfig(), only)
+    assert others.frame_indices.tolist() == only.tolist()
+
+
 def test_held_out_frames_leave_no_trace_in_the_plate(tmp_path):
     recipe = replace(default_recipe(frames=21), fps=48.0, background=False)
     folder = write_scene(tmp_path, recipe)

@@ -38,6 +38,24 @@ def test_a_scene_opens_with_its_cameras_and_its_up(folder):
     assert scene.frames("cam00").indices.tolist() == list(range(6))
 
 
+def test_another_camera_may_be_trained_on_and_the_former_one_evaluates(folder):
+    scene = open_scene(folder, "cam01")
+    assert scene.train_camera == "cam01"
+    assert scene.evaluation_cameras == ["cam00"]
+    known = scene.training_description()
+    assert known["camera"] == scene.description.cameras["cam01"].model_dump()
+    assert known["train_camera"] == "cam01"
+    assert not any("cam00" in str(file.parent) for file in scene.source_files())
+    assert open_scene(folder, "cam00").training_description() == (
+        open_scene(folder).training_description()
+    )
+
+
+def test_a_camera_that_the_scene_does_not_have_cannot_be_trained_on(folder):
+    with pytest.raises(InputError, match=r"'cam07' among cam00, cam01.*capture\.train_camera"):
+        open_scene(folder, "cam07")
+
+
 def test_a_camera_survives_the_file_exactly(folder):
     written = default_recipe().cameras["cam00"]
     read = open_scene(folder).cameras["cam00"]

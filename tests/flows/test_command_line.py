@@ -314,6 +314,50 @@ def test_a_full_disk_leaves_no_half_of_a_view(refuse, first_run, tmp_path, name)
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(("out", "wanted"), [("body.glb", "glb"), ("plys", "ply")])
+def test_a_run_is_exported_as_meshes(first_run, tmp_path, out, wanted):
+    run, _ = first_run
+    spacing = ("--spacing-m", "0.04")
+    done = mocoflow(
+        *("export", run, "--format", wanted, "--frames", "2,4-5", *spacing, "--out", tmp_path / out)
+    )
+    assert done.returncode == 0, done.stderr
+    assert "vertices" in done.stdout
+    files = [path.name for path in sorted((tmp_path / out).glob("*.ply"))]
+    assert files == ["000002.ply", "000004.ply", "000005.ply", "canonical.ply"] * (wanted == "ply")
+    assert (tmp_path / out).exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "because"),
+    [
+        ("--format", "obj", "--format"),
+        ("--format", "ply", "a folder"),
+        ("--frames", "100", "in the clip"),
+        ("--frames", "one", "numbers"),
+    ],
+)
+def test_meshes_that_cannot_be_are_refused(refuse, first_run, tmp_path, option, value, because):
+    run, _ = first_run
+    refuse("export", run, option, value, "--out", tmp_path / "body.glb", because=because)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_leaves_no_half_of_a_mesh(refuse, first_run, tmp_path):
+    run, _ = first_run
+    (tmp_path / ".new.body.glb").symlink_to("/dev/full")
+    wanted = ("--frames", "3", "--spacing-m", "0.04", "--out", tmp_path / "body.glb")
+    refuse("export", run, *wanted, because="full disk")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_is_not_finished_is_not_exported(refuse, first_run, tmp_path):
+    run, _ = first_run
+    record = json.loads((run / "run.json").read_text())
+    (tmp_path / "run.json").write_text(json.dumps(record | {"finished": False}))
+    refuse("export", tmp_path, "--out", tmp_path / "a.glb", because="an unfinished one")
+
+
 def test_rendering_a_folder_without_a_run_is_refused(refuse, tmp_path):
     refuse("render", tmp_path, "--out", tmp_path / "views", because="run.json")
 

@@ -77,6 +77,28 @@ def test_a_score_that_ends_a_run_is_not_of_another_camera(scene, toy_scene, reco
     assert parameters(changed) == parameters(undisturbed)
 
 
+def test_a_former_train_camera_is_as_unseen_as_the_others(toy_scene, reconstruct, tmp_path):
+    """Its pictures may be anything; only its meshes are used, which the run says."""
+
+    def replaced(scene):
+        files = (scene / "frames" / "cam00").iterdir()
+        for number, path in enumerate(sorted(files)):
+            shape = np.asarray(Image.open(path)).shape
+            noise = np.random.default_rng(number).integers(0, 256, shape, dtype=np.uint8)
+            Image.fromarray(noise).save(path)
+        return scene
+
+    elsewhere = {"settings": ("capture.train_camera=cam01",)}
+    first = reconstruct(toy_scene, tmp_path / "first", **elsewhere)
+    assert first.train_camera == "cam01"
+    assert any("given for cam00" in warning for warning in first.warnings)
+    assert set(first.scores["mocoflow"]) >= {"cam00", "cam02"}
+    scene = replaced(shutil.copytree(toy_scene, tmp_path / "scene"))
+    changed = reconstruct(scene, tmp_path / "out", store=str(tmp_path / "fresh"), **elsewhere)
+    assert not changed.stage("optimise_scene").cached
+    assert parameters(changed) == parameters(first)
+
+
 def test_what_the_metrics_read_does_change(scene, toy_scene, tmp_path):
     def others(path):
         return Request(scene_path=path).others.digest

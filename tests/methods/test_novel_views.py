@@ -8,10 +8,12 @@ import pytest
 from mocoflow_core.capture.frame_selection import select_frames
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.methods.novel_views import ViewRequest, _moments
+from mocoflow_core.methods.run_clip import RunClip
 
 
 def run_of(first: int, last: int, source_fps: float, fps: float) -> RunRecord:
-    capture = {"fps": fps, "source_fps": source_fps, "first_frame": first, "last_frame": last}
+    rates = {"fps": fps, "source_fps": source_fps}
+    capture = {**rates, "first_frame": first, "last_frame": last, "up": [0, 0, 1]}
     said = {"request": "", "scene": "turn", "scene_path": "", "preset": "toy", "store": ""}
     return RunRecord(**said, seed=0, configuration={}, capture=capture)
 
@@ -23,5 +25,5 @@ def test_without_a_choice_every_working_frame_is_rendered(working_fps):
     selected = select_frames(filmed, 30.0, working_fps, none, 0, 0)
     first, last = (int(selected.working[row]) for row in (0, -1))
     run = run_of(first, last, 30.0, selected.fps)
-    frames = [frame for frame, _ in _moments(run, ViewRequest(camera="orbit"))]
+    frames = [frame for frame, _ in _moments(RunClip.of(run), ViewRequest(camera="orbit"))]
     assert frames == selected.working.tolist()

@@ -9,7 +9,8 @@ from mocoflow_core.metrics.benchmark_tables import Contender
 from mocoflow_core.metrics.curve import CurveRow
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import Target, times_to_targets
-from mocoflow_core.report.benchmark_page import BenchmarkResults, write_benchmark_page
+from mocoflow_core.report.benchmark_page import write_benchmark_page
+from mocoflow_core.report.benchmark_results import BenchmarkResults
 
 METHODS = ("mocoflow", "without_local", "posed_mesh")
 COMMAND = "mocoflow benchmark --scenes 'turn & <walk>' --out there"

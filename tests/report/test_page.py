@@ -74,6 +74,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> ReportInputs:
     for camera in ("cam00", "cam01"):
         save_views(root / "views" / camera)
         save_views(root / "baseline" / camera)
+    save_views(root / "correspondences")
     write_video(root / "turntable.mp4", np.zeros((4, SIZE, SIZE, 3), np.uint8), 5.0)
     scores = [
         ScoreRow("turn", method, 3, camera, index, metric, value + 0.01 * index, "crop 60 px")
@@ -101,6 +102,8 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> ReportInputs:
         baseline_views=root / "baseline",
         novel_camera="cam01",
         novel_view=root / "views/cam01",
+        correspondences=root / "correspondences",
+        canonical_frame=9,
         turntable=root / "turntable.mp4",
         warnings=["the height of 2.4 m is unusual"],
         guard_events=["step 12 refused"],
@@ -155,6 +158,7 @@ def test_every_part_of_a_whole_run_is_on_the_page(inputs: ReportInputs, tmp_path
         "step 12 refused",
         "640 pixels of 8 held-out frames of cam00",
         "Turntable",
+        "Same colour, same point",
         "Did the optimisation repair",
         "&#34;rays&#34;: 64",
         "<svg",
@@ -177,11 +181,20 @@ def test_train_frames_are_shown_only_where_they_were_held_out(
     assert moments[3:] == [("frame 9", "1 of 1")]
 
 
+def test_correspondences_begin_with_the_canonical_frame(
+    inputs: ReportInputs, tmp_path: Path
+) -> None:
+    page = page_of(inputs, tmp_path)
+    assert re.findall(r'alt="places on the body, frame (\d+)"', page) == ["9", "4", "14"]
+    assert re.findall(r"<h4>canonical, frame (\d+)</h4>", page) == ["9"]
+
+
 def test_a_run_without_anything_but_its_name_still_has_a_page(tmp_path: Path) -> None:
     page = page_of(ReportInputs({"scene": "bare"}), tmp_path)
     assert "no held-out views" in page
     assert "<svg" not in page
     assert "<video" not in page
+    assert "Correspondences" not in page
 
 
 def test_the_same_run_gives_the_same_page(inputs: ReportInputs, tmp_path: Path) -> None:

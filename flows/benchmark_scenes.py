@@ -1,0 +1,65 @@
+"""The scenes of a benchmark as people write them: folders or synthetic ones, from any camera."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from flows.demo_scene import demo_scene
+from mocoflow_core.errors import InputError
+from mocoflow_core.synthetic.catalogue import named_scene
+
+
+class AskedScene(NamedTuple):
+    """One scene of a benchmark."""
+
+    name: str  # what the benchmark calls it
+    where: str  # a folder, or a synthetic scene's name with its settings
+    train_camera: str | None  # null: the scene's own
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """What each of its runs is told."""
+        return (f"capture.train_camera={self.train_camera}",) if self.train_camera else ()
+
+    def folder(self) -> Path:
+        """Where it lies; a synthetic one is made when it is first asked for."""
+        return Path(self.where) if _is_folder(self.where) else demo_scene(self.where)
+
+
+def read_scenes(words: Iterable[str]) -> tuple[AskedScene, ...]:
+    """Scenes such as ``data/someone``, ``turn_noise6,seed=1`` and ``data/someone@cam02``.
+
+    A folder is called by its last part, a synthetic scene as it is written, both with the camera.
+
+    Raises InputError for a scene that is neither, and for two of one name.
+    """
+    scenes: dict[str, AskedScene] = {}
+    for word in words:
+        scene = _read(word)
+        if scene.name in scenes:
+            raise InputError(
+                "Scenes of a benchmark have different names", repr(scene.name), "Rename a folder."
+            )
+        scenes[scene.name] = scene
+    return tuple(scenes.values())
+
+
+def _read(word: str) -> AskedScene:
+    where, at, camera = word.rpartition("@")
+    if not at or Path(word).is_dir():
+        where, camera = word, ""
+    if _is_folder(where):
+        if not Path(where).is_dir():
+            raise InputError(
+                "A scene is a folder or a synthetic one's name", repr(where), "Check the path."
+            )
+        name = Path(where).resolve().name
+    else:
+        name = named_scene(where).name
+    return AskedScene(f"{name}@{camera}" if camera else name, where, camera or None)
+
+
+def _is_folder(where: str) -> bool:
+    return "/" in where or Path(where).is_dir()
