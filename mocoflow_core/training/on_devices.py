@@ -50,7 +50,7 @@ def optimise_on(
     death ends the run. The launcher stays in this process's group.
 
     Args:
-        workspace: folder that survives a kill; of several machines only the first one needs it.
+        workspace: folder that survives a kill; other machines find the job in it, and read it only.
         leave_out: is told wall and CPU seconds that were no training: looking at the scene,
             starting processes.
         log: is given what the processes print.
@@ -114,10 +114,9 @@ def _launcher(devices: Devices, job_file: Path, where: list[str], how: list[str]
 
 def _environment(devices: Devices) -> dict[str, str]:
     """The same code as in this process, one thread a rank, and one machine's talk kept inside."""
+    package = str(Path(mocoflow_core.__file__).parents[1])
     environment = {
-        "PYTHONPATH": os.pathsep.join(
-            [str(Path(mocoflow_core.__file__).parents[1]), *filter(None, sys.path)]
-        ),
+        "PYTHONPATH": os.pathsep.join(filter(None, (package, os.environ.get("PYTHONPATH")))),
         "PYTHONUNBUFFERED": "1",
         "OMP_NUM_THREADS": "1",
         "TORCH_CPP_LOG_LEVEL": "ERROR",
@@ -139,9 +138,9 @@ def _run(
         run_logged(command, listener.hear, environment)
     except ProcessFailed as ended:
         raise RanksFailed(
-            f"a process died, and died again after a restart. {workspace} keeps the last "
-            "checkpoint: the same command goes on from there. If memory ran out, ask for fewer "
-            f"--devices or a smaller schedule.rays. What was printed last:\n{ended}"
+            f"A process died again after a restart, or none could start. {workspace} keeps the "
+            "last checkpoint, if there was one: the same command goes on from there. If memory ran "
+            f"out, ask for fewer --devices or a smaller schedule.rays. Printed last:\n{ended}"
         ) from ended
     if listener.failure is not None:
         raise listener.failure
