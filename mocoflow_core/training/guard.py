@@ -99,7 +99,8 @@ class Guard:
         for key, value in good.items():
             kind, name, *part = key.split("/")
             if kind == "moment":
-                self._moments.setdefault(named[name], {})[part[0]] = value
+                owner = named[name]
+                self._moments.setdefault(owner, {})[part[0]] = value.to(owner.device)
 
     def remember(self) -> None:
         """Take the present state as good, unless it is not finite."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from mocoflow_core.configuration import ConfigurationPart
 
@@ -52,6 +52,10 @@ class ScheduleConfig(ConfigurationPart):
     )
     checkpoint_every_s: float = Field(5.0, gt=0, description="a kill loses at most this much work")
     threads: int | None = Field(None, ge=1, description="forced; otherwise chosen by a probe")
+
+    def deciding(self) -> dict[str, JsonValue]:
+        """The fields that decide where a run ends, and not only how it gets there."""
+        return self.model_dump(mode="json", exclude={"threads", "checkpoint_every_s"})
 
     @property
     def joint_steps(self) -> int:
