@@ -8,6 +8,7 @@ CPU seconds, also to a budget: what one idle core would take, whatever else the 
 from __future__ import annotations
 
 import time
+from dataclasses import astuple
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -21,7 +22,14 @@ from mocoflow_core.capture.scene import Scene
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.scene_shape import SceneShape
 from mocoflow_core.methods.rendered_views import ScoredView, TrainedRenderer, scored_views
-from mocoflow_core.methods.scored_views import Subject, few_views, score_views
+from mocoflow_core.methods.scored_views import (
+    Moment,
+    Subject,
+    error_curve,
+    few_views,
+    score_views,
+)
+from mocoflow_core.metrics.curve import CurveRow
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.planning.inspection import inspect_scene
 from mocoflow_core.planning.plan import ScenePlan, plan_scene
@@ -34,6 +42,7 @@ from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene
 from mocoflow_core.training.pretrain_density import pretrain_density
 from mocoflow_core.training.problem import Learned, shell_problem
+from mocoflow_core.training.snapshots import Snapshot, read_snapshots, snapshot_weights
 
 
 class Trained(NamedTuple):
@@ -47,6 +56,7 @@ class PreparedScene:
     """What the optimisation starts from; ``spent`` is the training clock up to there."""
 
     def __init__(self, scene: Scene, configuration: Configuration) -> None:
+        self.name = scene.description.name
         clock = TrainingClock(now=_cpu_now)
         self.clip, self.plan, self.density, self.motion = _prepare(scene, configuration)
         self.spent = clock.read()
@@ -59,6 +69,23 @@ class PreparedScene:
             result = self._optimise(configuration, seed, Path(folder))
             trained = TrainedScene.open(Path(folder))
         return Trained(result, self._scores(trained))
+
+    def curve(self, configuration: Configuration, seed: int, method: str) -> list[CurveRow]:
+        """Optimise as the plan says and score every snapshot, on the whole training clock."""
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            self._optimise(configuration, seed, folder)
+            moments = [self._moment(folder, s, method) for s in read_snapshots(folder)]
+            subject = Subject(self.name, seed)
+            return error_curve(
+                subject, moments, self._views, configuration.evaluation, lambda share, text: None
+            )
+
+    def _moment(self, folder: Path, snapshot: Snapshot, method: str) -> Moment:
+        opened = TrainedScene.open(folder, snapshot_weights(folder, snapshot))
+        seconds = self.spent + Seconds(snapshot.wall_s, snapshot.cpu_s)
+        renderer = TrainedRenderer(opened, self.clip)
+        return Moment(method, "optimise_scene", snapshot.step, *astuple(seconds), renderer)
 
     def _optimise(
         self, configuration: Configuration, seed: int, folder: Path

@@ -58,6 +58,14 @@ def reconstruct(
         typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
     ] = None,
     store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+    devices: Annotated[
+        int | None,
+        typer.Option(help="GPUs, or cores without any, that share the optimisation."),
+    ] = None,
+    machines: Annotated[int, typer.Option(help="With so many devices each.")] = 1,
+    rendezvous: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Where several machines meet.")
+    ] = None,
 ) -> None:
     """Reconstruct a scene: train, render, score, report."""
     from flows.request import Request
@@ -72,6 +80,9 @@ def reconstruct(
         until=until,
         settings=tuple(settings or ()),
         store_url=store,
+        devices=devices,
+        machines=machines,
+        rendezvous=rendezvous,
     )
     if request.claim(out).is_finished():
         typer.echo(f"Already finished: {out / 'report.html'}")
@@ -90,6 +101,9 @@ def reconstruct(
             until=until,
             settings=request.settings,
             store=store,
+            devices=devices,
+            machines=machines,
+            rendezvous=rendezvous,
         )
     typer.echo(f"Report: {out / 'report.html'}")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from flows.preparation import Preparation
 from flows.request import Request
 from mocoflow_core.artifacts import SceneArtifact
@@ -12,6 +14,7 @@ from tasks.stage import Aside
 def optimise(request: Request, prepared: Preparation, before: Aside) -> SceneArtifact:
     """Train the scene, or find it in the store. ``before``: the training clock so far."""
     where, chosen = request.store, request.configuration
+    devices = Aside(asdict(request.processes))
     schedule = chosen.schedule.joint()
     if chosen.representation == "networks":
         return optimise_networks(
@@ -20,6 +23,7 @@ def optimise(request: Request, prepared: Preparation, before: Aside) -> SceneArt
             prepared.plan,
             prepared.motion,
             before,
+            devices,
             chosen.losses,
             schedule,
             request.seed,
@@ -31,6 +35,7 @@ def optimise(request: Request, prepared: Preparation, before: Aside) -> SceneArt
         prepared.density,
         prepared.motion,
         before,
+        devices,
         chosen.canonical,
         chosen.motion,
         chosen.sampling,

@@ -34,6 +34,9 @@ def reconstruct(
     until: str | None = None,
     settings: tuple[str, ...] = (),
     store: str | None = None,
+    devices: int | None = None,
+    machines: int = 1,
+    rendezvous: str | None = None,
 ) -> RunRecord:
     """Reconstruct the person of a scene folder and say how well it went.
 
@@ -47,6 +50,10 @@ def reconstruct(
         until: score at which the optimisation stops, such as ``train_psnr=30``.
         settings: single fields, such as ``schedule.fine_steps=200``.
         store: folder or fsspec address of the artifact store.
+        devices: GPUs, or cores where there are none, that share the optimisation; by default all
+            GPUs, or one process without any.
+        machines: that have so many devices each and the store at the same path.
+        rendezvous: ``host:port`` at which several machines meet.
     """
     start, machine = perf_counter(), describe_machine()
     request = Request(
@@ -58,6 +65,9 @@ def reconstruct(
         until=until,
         settings=settings,
         store_url=store,
+        devices=devices,
+        machines=machines,
+        rendezvous=rendezvous,
     )
     folder = request.claim(out)
     where, chosen = request.store, request.configuration

@@ -19,6 +19,7 @@ from mocoflow_core.io.run_folder import RunFolder, RunRecord
 from mocoflow_core.io.store import Store
 from mocoflow_core.presets import PRESETS, Configuration
 from mocoflow_core.settings import with_settings
+from mocoflow_core.training.devices import Devices, choose_devices
 from tasks.source import Source, clip_source, evaluation_source, meshes_source
 
 # Counts up when a finished folder of an earlier version must not be taken for a finished one.
@@ -43,6 +44,9 @@ class Request(BaseModel):
     until: str | None = None
     settings: tuple[str, ...] = ()
     store_url: str | None = None
+    devices: int | None = None
+    machines: int = 1
+    rendezvous: str | None = None
 
     @cached_property
     def scene(self) -> Scene:
@@ -64,6 +68,11 @@ class Request(BaseModel):
         chosen = with_settings(preset, (*self.settings, *budget, *until))
         require_sense(chosen, preset)
         return chosen
+
+    @cached_property
+    def processes(self) -> Devices:
+        """What the optimisation runs on; its result is the same, but for rounding."""
+        return choose_devices(self.devices, self.machines, self.rendezvous)
 
     @cached_property
     def store(self) -> Store:
@@ -89,7 +98,7 @@ class Request(BaseModel):
     def check(self) -> None:
         """Raise InputError for what settings and file names show to be wrong, before any work."""
         select_training_frames(self.scene, self.configuration.capture)
-        _ = self.bodies
+        _ = self.bodies, self.processes
 
     def claim(self, out: Path) -> RunFolder:
         """Take a folder for the results. Raises InputError when it holds anything else."""

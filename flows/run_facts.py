@@ -36,7 +36,11 @@ def describe_run(
     camera = {**clip.summary["camera"]}
     train_camera = camera.pop("name")
     return {
-        "machine": {**trained.summary["machine"], "threads": trained.summary["threads"]},
+        "machine": {
+            **trained.summary["machine"],
+            "threads": trained.summary["threads"],
+            "devices": trained.summary.get("devices", 1),
+        },
         "train_camera": train_camera,
         "capture": {name: clip.summary[name] for name in CAPTURE},
         "cameras": {train_camera: camera, **evaluation.summary["cameras"]},

@@ -86,6 +86,7 @@ def paper() -> Configuration:
             rate_motion=5e-4,
             adam_beta2=0.999,
             adam_epsilon=1e-8,
+            averaging=0.0,
         ),
     )
 

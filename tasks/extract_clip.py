@@ -11,7 +11,7 @@ from mocoflow_core.capture.strange_frames import sound_clip
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Broken and repeated frames are left out, silent masks not believed.
+ALGORITHM_VERSION = 3  # What is usual is measured on training frames alone.
 
 
 @stage(ClipArtifact, ALGORITHM_VERSION)

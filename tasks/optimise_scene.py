@@ -10,24 +10,22 @@ from mocoflow_core.artifacts import (
     SceneArtifact,
 )
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
 from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.rendering.sampling import SamplingConfig
-from mocoflow_core.training import optimise_scene as training
-from mocoflow_core.training.clock import Seconds, TrainingClock
-from mocoflow_core.training.fit_motion import MotionStart
-from mocoflow_core.training.network_stages import network_problem
-from mocoflow_core.training.optimise_scene import OptimisationResult
-from mocoflow_core.training.problem import Learned, Problem, shell_problem
+from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.devices import Devices
+from mocoflow_core.training.job import NetworkJob, ShellJob, TrainingJob
+from mocoflow_core.training.on_devices import optimise_on
+from mocoflow_core.training.problem import Learned
 from mocoflow_core.training.schedule import ScheduleConfig
 from tasks.growing_curve import GrowingCurve
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Guard of rising losses; held-out pixels; schedules in shares.
-NETWORKS_VERSION = 1  # First version.
+ALGORITHM_VERSION = 3  # Weights averaged over the last steps; a guard that keeps its distance.
+NETWORKS_VERSION = 2  # A guard that keeps its distance.
 
 
 @stage(SceneArtifact, ALGORITHM_VERSION, resumes=True)
@@ -38,6 +36,7 @@ def optimise_scene(
     density: DensityArtifact,
     motion: MotionArtifact,
     before: Aside,
+    devices: Aside,
     canonical: CanonicalConfig,
     moving: MotionConfig,
     sampling: SamplingConfig,
@@ -54,10 +53,11 @@ def optimise_scene(
     decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
     canonical = canonical.model_copy(update={"finest_m": decided.no_finer(canonical.finest_m)})
     sampling = sampling.model_copy(update={"step_m": decided.no_finer(sampling.step_m)})
-    problem = shell_problem(
-        CanonicalDensity.load(work.open(density)),
-        MotionStart.load(work.open(motion)),
-        SceneShape(
+    job = ShellJob(
+        clip=work.open(clip),
+        density=work.open(density),
+        motion=work.open(motion),
+        shape=SceneShape(
             canonical=canonical,
             motion=moving,
             times=tuple(seen.times[~seen.held_out].tolist()),
@@ -67,15 +67,17 @@ def optimise_scene(
             residual=decided.needs("motion_residual"),
             light=decided.light,
         ),
-        Learned(
+        learned=Learned(
             motion_residual=decided.needs("motion_residual"),
             consensus=decided.needs("motion_consensus"),
             appearance_codes=decided.needs("appearance_codes"),
         ),
-        losses,
-        seed,
+        losses=losses,
+        schedule=schedule,
+        seed=seed,
+        before=_spent(before),
     )
-    return _summary(_optimise(work, seen, problem, schedule, seed, before), before)
+    return _optimise(work, job, before, devices)
 
 
 @stage(SceneArtifact, NETWORKS_VERSION, resumes=True)
@@ -85,6 +87,7 @@ def optimise_networks(
     plan: PlanArtifact,
     fitted: MotionArtifact,
     before: Aside,
+    devices: Aside,
     losses: LossConfig,
     schedule: ScheduleConfig,
     seed: int,
@@ -93,31 +96,20 @@ def optimise_networks(
 
     Output: as of the fast representation. Minutes to days.
     """
-    seen = Clip.load(work.open(clip))
     decided = ScenePlan.model_validate_json((work.open(plan) / "plan.json").read_text())
-    learned = Learned(
-        consensus=decided.needs("motion_consensus"),
-        appearance_codes=decided.needs("appearance_codes"),
+    job = NetworkJob(
+        clip=work.open(clip),
+        fitted=work.open(fitted),
+        learned=Learned(
+            consensus=decided.needs("motion_consensus"),
+            appearance_codes=decided.needs("appearance_codes"),
+        ),
+        losses=losses,
+        schedule=schedule,
+        seed=seed,
+        before=_spent(before),
     )
-    problem = network_problem(work.open(fitted), seen, learned, losses, seed)
-    return _summary(_optimise(work, seen, problem, schedule, seed, before), before)
-
-
-def _optimise(
-    work: Stage, seen: Clip, problem: Problem, schedule: ScheduleConfig, seed: int, before: Aside
-) -> OptimisationResult:
-    spent = _spent(before)
-    return training.optimise_scene(
-        seen,
-        problem,
-        schedule,
-        seed,
-        spent,
-        work.folder,
-        work.progress,
-        GrowingCurve(spent).show,
-        TrainingClock(paused=work.leave_out),
-    )
+    return _optimise(work, job, before, devices)
 
 
 def _spent(before: Aside) -> Seconds:
@@ -125,7 +117,17 @@ def _spent(before: Aside) -> Seconds:
     return Seconds(float(before.values["wall_s"]), float(before.values["cpu_s"]))
 
 
-def _summary(result: OptimisationResult, before: Aside) -> Summary:
+def _optimise(work: Stage, job: TrainingJob, before: Aside, devices: Aside) -> Summary:
+    """Train, and tell what it came to."""
+    result = optimise_on(
+        Devices(**devices.values),
+        job,
+        work.folder,
+        work.progress,
+        GrowingCurve(job.before).show,
+        work.leave_out,
+        work.log,
+    )
     return {
         "steps": result.steps,
         "rays": result.rays,
@@ -137,6 +139,7 @@ def _summary(result: OptimisationResult, before: Aside) -> Summary:
         "held_out": result.held_out,
         "warnings": list(result.warnings),
         "machine": before.values["machine"],
-        "before_wall_s": _spent(before).wall,
-        "before_cpu_s": _spent(before).cpu,
+        "devices": Devices(**devices.values).in_all,
+        "before_wall_s": job.before.wall,
+        "before_cpu_s": job.before.cpu,
     }

@@ -25,6 +25,7 @@ from mocoflow_core.io.store import Store
 from mocoflow_core.threads import torch_threads
 from tasks.progress import Progress, showing_progress
 from tasks.source import Source
+from tasks.terminal_bar import terminal_line
 
 Inputs = ParamSpec("Inputs")
 Kind = TypeVar("Kind", bound=Artifact)
@@ -47,6 +48,7 @@ class Stage:
     progress: Progress
     store: Store
     leave_out: Callable[[float, float], None]  # wall and CPU seconds that were no work on it
+    log: Callable[[str], None]  # a line for people
 
     def open(self, artifact: Artifact) -> Path:
         """The folder with an input's payload files."""
@@ -99,7 +101,7 @@ class CachedStage(Generic[Inputs, Kind]):
                 return work.found
             # More than one thread only where a stage has measured that it pays.
             with torch_threads(1), showing_progress(self.kind.stage, work.note_time) as progress:
-                stage = Stage(work.path, progress, store, work.leave_out)
+                stage = Stage(work.path, progress, store, work.leave_out, _tell)
                 summary = self.body(stage, **arguments)  # type: ignore
             made = work.commit(self.version, *_by_content(arguments), summary)
         _log(made)
@@ -107,6 +109,13 @@ class CachedStage(Generic[Inputs, Kind]):
 
     def _key(self, arguments: Mapping[str, Any]) -> str:
         return key_of(self.kind.stage, self.version, *_by_content(arguments))
+
+
+def _tell(line: str) -> None:
+    """In a terminal, and on the run's page."""
+    terminal_line(line)
+    if TaskRunContext.get():
+        get_run_logger().info(line)
 
 
 def _log(made: Artifact) -> None:

@@ -28,13 +28,15 @@ from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.optimise_scene import OptimisationResult, optimise_scene, unwatched
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
-from mocoflow_core.training.problem import Learned, shell_problem
+from mocoflow_core.training.problem import Learned, Problem, shell_problem
+from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot
 
 SHELL_M = 0.06
 MOTION = MotionConfig(residual=ResidualConfig(hidden=16))
 SAMPLING = SamplingConfig(step_m=0.03)
+LOSSES = LossConfig(consensus_points=32)
 SCHEDULE = ScheduleConfig(
     coarse_steps=15, fine_steps=10, rays=48, threads=1, checkpoint_every_s=1e6
 )
@@ -90,6 +92,24 @@ def prepare(scene: Path) -> Prepared:
     return Prepared(clip, meshes, density, motion, shape)
 
 
+def problem_of(
+    prepared: Prepared,
+    seed: int = 0,
+    learned: Learned | None = None,
+    losses: LossConfig | None = None,
+    ranks: Ranks = ALONE,
+) -> Problem:
+    return shell_problem(
+        prepared.density,
+        prepared.motion,
+        prepared.shape,
+        learned or Learned(),
+        losses or LOSSES,
+        seed,
+        ranks,
+    )
+
+
 def train(
     prepared: Prepared,
     workspace: Path,
@@ -102,17 +122,9 @@ def train(
     watch: Callable[[list[Snapshot]], None] = unwatched,
     clock: TrainingClock | None = None,
 ) -> OptimisationResult:
-    problem = shell_problem(
-        prepared.density,
-        prepared.motion,
-        prepared.shape,
-        learned or Learned(),
-        losses or LossConfig(consensus_points=32),
-        seed,
-    )
     return optimise_scene(
         prepared.clip,
-        problem,
+        problem_of(prepared, seed, learned, losses),
         schedule,
         seed,
         before or Seconds(),

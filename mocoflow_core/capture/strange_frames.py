@@ -3,11 +3,13 @@
 A stationary camera shows the same background in every frame. A black, white or garbled frame does
 not; it would be learned as colour. An empty mask says that nobody is there; where the frame shows
 somebody, it would teach the model to make the person vanish.
+
+What is usual is measured on training frames alone: held-out frames are judged, and judge nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -54,21 +56,22 @@ def sound_clip(clip: Clip, threshold: int) -> tuple[Clip, tuple[str, ...]]:
         threshold: difference to the plate that counts as a change, in steps of 1/255.
     """
     found = measure_frames(clip, threshold)
+    training = ~clip.held_out
     broken = found.changed > LARGEST_CHANGE
     warnings = []
-    if broken.mean() > FEW:
+    if broken[training].mean() > FEW:
         warnings.append(
-            f"{broken.sum()} of {len(broken)} frames differ from the background in more than "
-            f"{100 * LARGEST_CHANGE:.0f} % of it: another plate, another exposure, or a camera "
-            "that moves?"
+            f"{broken[training].sum()} of {training.sum()} frames differ from the background in "
+            f"more than {100 * LARGEST_CHANGE:.0f} % of it: another plate, another exposure, or a "
+            "camera that moves?"
         )
         broken[:] = False
     unseen = ~broken & (found.area == 0) & clip.has_mask
     silent = unseen & (found.surplus > LARGEST_SURPLUS)
-    usual = float(np.median(found.surplus[~broken]))
+    usual = float(np.median(found.surplus[training & ~broken]))
     limit = max(LARGEST_SURPLUS, USUAL_SURPLUS * usual)
     double = ~broken & ~unseen & (found.surplus > limit)
-    jumping = _jumps(found.area, broken | unseen | ~clip.has_mask)
+    jumping = _jumps(found.area, broken | unseen | ~clip.has_mask, training)
     odd = ~broken & (found.detour > LARGEST_DETOUR)
     warnings += [
         f"{_named(rows, clip)} {words}"
@@ -93,7 +96,8 @@ def measure_frames(clip: Clip, threshold: int) -> FrameFindings:
     side = 2 * max(round(MARGIN * max(clip.masks.shape[1:])), 1) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     area = clip.masks.sum(axis=(1, 2)).astype(np.float64)
-    person = float(np.median(area[area > 0])) if area.any() else np.inf
+    shown = area[(area > 0) & ~clip.held_out]
+    person = float(np.median(shown)) if len(shown) else np.inf
     changed, surplus = np.zeros(len(area)), np.zeros(len(area))
     for row, (frame, mask) in enumerate(zip(clip.frames, clip.masks, strict=True)):
         outside = cv2.dilate(mask.astype(np.uint8), kernel) == 0
@@ -110,25 +114,37 @@ def _detours(clip: Clip) -> Shares:
     frames = clip.frames[:, ::stride, ::stride].astype(np.float32)
     masks = clip.masks[:, ::stride, ::stride]
     result = np.zeros(len(frames))
-    for row in range(1, len(frames) - 1):
-        person = masks[row - 1] | masks[row] | masks[row + 1]
+    for before_row, row, after_row in _neighbours(np.arange(len(frames)), ~clip.held_out):
+        person = masks[before_row] | masks[row] | masks[after_row]
         if person.any():
-            before, frame, after = (frames[row + step][person] for step in (-1, 0, 1))
+            before, frame, after = (frames[r][person] for r in (before_row, row, after_row))
             away = min(np.abs(frame - before).mean(), np.abs(frame - after).mean())
             if away > NOISE:
                 result[row] = away / max(np.abs(after - before).mean(), NOISE)
     return result
 
 
-def _jumps(area: Shares, doubtful: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _jumps(
+    area: Shares, doubtful: NDArray[np.bool_], training: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """Masks whose size jumps against both neighbours, which agree."""
-    rows = np.flatnonzero(~doubtful)
     result = np.zeros(len(area), bool)
-    for before, row, after in zip(rows, rows[1:], rows[2:], strict=False):
+    for before, row, after in _neighbours(np.flatnonzero(~doubtful), training):
         low, high = sorted((area[before], area[after]))
         agree = high < LARGEST_JUMP * low
         result[row] = agree and not low / LARGEST_JUMP < area[row] < high * LARGEST_JUMP
     return result
+
+
+def _neighbours(
+    rows: NDArray[np.int64], training: NDArray[np.bool_]
+) -> Iterator[tuple[int, int, int]]:
+    """Each of the rows between the nearest training frames among them, where it has both."""
+    known = rows[training[rows]]
+    for row in rows:
+        earlier, later = known[known < row], known[known > row]
+        if len(earlier) and len(later):
+            yield int(earlier[-1]), int(row), int(later[0])
 
 
 def _named(rows: NDArray[np.bool_], clip: Clip) -> str:

@@ -7,6 +7,7 @@ lies from it and what colour it has. Coarse levels carry what fine levels have n
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import torch
 from pydantic import Field
@@ -66,6 +67,15 @@ class CanonicalGrid(nn.Module):
         nn.init.zeros_(head.weight[:1])
         nn.init.zeros_(head.bias[:1])
         self.log_sharpness = nn.Parameter(torch.tensor(math.log(configuration.sharpness_m)))
+
+    def _apply(self, change: Callable[[Tensor], Tensor], recurse: bool = True) -> CanonicalGrid:
+        """What torch moves a module with; the grids go where the tables go."""
+        super()._apply(change, recurse)
+        device = self.log_sharpness.device
+        self.grids = [
+            grid if grid.origin.device == device else grid.to(device) for grid in self.grids
+        ]
+        return self
 
     def features(self, points: Tensor) -> Tensor:
         """Canonical points (P, 3) -> (P, levels x channels)."""

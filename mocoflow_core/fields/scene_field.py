@@ -29,6 +29,10 @@ class SceneField(nn.Module, ABC):
         self.register_buffer("times", times.double(), persistent=False)
         self.appearance = nn.Parameter(torch.zeros(len(times), appearance_width))
 
+    @property
+    def device(self) -> torch.device:
+        return self.times.device
+
     def appearance_at(self, times: Tensor) -> Tensor:
         """Appearance codes (G, A) at any times (G,), linear between training frames."""
         return interpolate_rows(self.appearance, self.times, times)

@@ -25,7 +25,10 @@ class Rays:
         """Points at the given distances (R,) along the rays, (R, 3)."""
         return self.origins + distance_m[:, None] * self.directions
 
-    def select(self, rows: Tensor) -> Rays:
+    def to(self, device: torch.device) -> Rays:
+        return Rays(self.origins.to(device), self.directions.to(device))
+
+    def select(self, rows: Tensor | slice) -> Rays:
         return Rays(self.origins[rows], self.directions[rows])
 
 

@@ -45,9 +45,12 @@ class BoxScene:
     def __init__(
         self, field: NetworkField, boxes: FrameBoxes, coarse_samples: int, fine_samples: int
     ) -> None:
-        """Args: boxes with a row for each moment; their times are those of the moments."""
+        """Args: boxes with a row for each moment; their times are those of the moments.
+
+        They go to the device that the field lies on.
+        """
         self.field = field
-        self.boxes = boxes
+        self.boxes = boxes.to(field.device)
         self.coarse_samples = coarse_samples
         self.jitters = coarse_samples + fine_samples
 
@@ -63,14 +66,14 @@ class BoxScene:
 
     def pixels(self, camera: Camera, row: int) -> VisiblePixels:
         """All pixels, as the paper draws them; those that miss the box have no depth range."""
-        pixels = torch.arange(camera.width * camera.height)
+        pixels = torch.arange(camera.width * camera.height, device=self.field.device)
         rays, along = pixel_rays(camera, pixels)
         near, far = self.boxes.intersect(rays, torch.full_like(pixels, row))
         hit = far > near
         return VisiblePixels(
-            pixels,
-            torch.where(hit, near, 0.0) / along,
-            torch.where(hit, far, 0.0) / along,
+            pixels.cpu(),
+            (torch.where(hit, near, 0.0) / along).cpu(),
+            (torch.where(hit, far, 0.0) / along).cpu(),
         )
 
     def to_canonical(self, points: Tensor, row: Tensor) -> tuple[Tensor, Tensor]:
@@ -191,7 +194,8 @@ class BoxScene:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """rgb (R, 3), opacity (R,) and density (S,) with gradients where they can be felt."""
         rays, ray = len(background), samples.ray
-        thickness = (density * samples.step_m).reshape(rays, -1)
+        # Not -1: there may be no ray at all.
+        thickness = (density * samples.step_m).reshape(rays, len(density) // max(rays, 1))
         ahead = (thickness.cumsum(1) - thickness).reshape(-1)
         felt = ((density > 0) & (ahead < _HIDDEN)).nonzero()[:, 0]
         present, hidden = self.field.density(network, canonical[felt])
@@ -209,5 +213,6 @@ def _in_order(first: Tensor, second: Tensor, order: Tensor) -> Tensor:
     """Points of the coarse (R N, 3) and the added samples (R M, 3), merged as the order (R, N + M)
     of their distances says, (R (N + M), 3)."""
     rays = len(order)
-    both = torch.cat([first.reshape(rays, -1, 3), second.reshape(rays, -1, 3)], 1)
+    parts = [points.reshape(rays, len(points) // max(rays, 1), 3) for points in (first, second)]
+    both = torch.cat(parts, 1)
     return both.gather(1, order[..., None].expand(-1, -1, 3)).reshape(-1, 3)

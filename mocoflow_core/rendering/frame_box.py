@@ -43,6 +43,10 @@ class FrameBoxes:
     lower: Tensor  # (F, 3) metres, in the boxes' axes
     upper: Tensor  # (F, 3)
 
+    def to(self, device: torch.device) -> FrameBoxes:
+        parts = (self.rotation, self.times, self.lower, self.upper)
+        return FrameBoxes(*(part.to(device) for part in parts))
+
     def at(self, times: Tensor) -> FrameBoxes:
         """Boxes at any times (G,), linear between frames."""
         lower, upper = (interpolate_rows(v, self.times, times) for v in (self.lower, self.upper))

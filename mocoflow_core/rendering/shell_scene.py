@@ -50,12 +50,15 @@ class ShellScene:
         sampling: SamplingConfig,
         times: Tensor | None = None,
     ) -> None:
-        """Args: body with a row for each of ``times`` (G,); None: the training frames."""
+        """Args: body with a row for each of ``times`` (G,); None: the training frames.
+
+        What is not there yet goes to the device that the field lies on.
+        """
         self.field = field
-        self.body = body
+        self.body = body if body.times.device == field.device else body.to(field.device)
         self.shell_width_m = shell_width_m
         self.sampling = sampling
-        self.times = times
+        self.times = None if times is None else times.to(field.device)
 
     @property
     def moments(self) -> Moments:

@@ -27,7 +27,7 @@ class Found:
 
     @property
     def is_finite(self) -> bool:
-        return np.isfinite(self.error) and all(_is_finite(numbers) for numbers in self.watched)
+        return all(_is_finite(numbers) for numbers in (self.error, *self.watched))
 
 
 class LawBroken(AssertionError):

@@ -45,7 +45,7 @@ def measure_case(area: str, case: Case[Any]) -> Iterator[StabilityRow]:
             bound=bound,
             unit=case.unit,
             finite=found.is_finite,
-            passed=found.is_finite and found.error <= bound,
+            passed=found.is_finite and bool(found.error <= bound),
             remark=found.remark,
             seconds=time.perf_counter() - start,
         )

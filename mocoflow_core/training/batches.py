@@ -18,9 +18,11 @@ from mocoflow_core.training.held_out import HeldOutPixels
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """R rays with what the camera saw along them."""
+    """R rays with what the camera saw along them: all of a step, or one rank's part."""
 
     rays: Rays
+    rays_in_all: int  # of the step, on all ranks
+    first_row: int  # training frame of the step's first ray
     row: Tensor  # (R,) training frame of each ray
     near: Tensor  # (R,) metres along the ray between which the person can be
     far: Tensor  # (R,)
@@ -29,6 +31,26 @@ class Batch:
     has_mask: Tensor  # (R,) 0 where the frame came without a mask
     background: Tensor  # (R, 3)
     jitter: Tensor  # (R, J) in [0, 1), as many as the scene's rays take
+
+    def part(self, rows: slice, device: torch.device) -> Batch:
+        """Some of the rays, on a device."""
+
+        def these(values: Tensor) -> Tensor:
+            return values[rows].to(device)
+
+        return Batch(
+            self.rays.select(rows).to(device),
+            self.rays_in_all,
+            self.first_row,
+            these(self.row),
+            these(self.near),
+            these(self.far),
+            these(self.rgb),
+            these(self.mask),
+            these(self.has_mask),
+            these(self.background),
+            these(self.jitter),
+        )
 
 
 class PixelSource(Protocol):
@@ -103,6 +125,8 @@ class TrainingPixels:
         through, along = pixel_rays(self.camera, pixel)
         return Batch(
             through,
+            rays,
+            int(chosen[0]),
             row,
             self.nearest[found] * along,
             self.farthest[found] * along,

@@ -1,6 +1,6 @@
 """No NaN survives and no run goes astray unseen.
 
-A bad step is refused, the last good state restored, the rate halved.
+A bad step is refused, the last good state restored, the rates cut.
 """
 
 from __future__ import annotations
@@ -22,10 +22,17 @@ _RECENT_RAYS = 1000
 _RECENT_FRAMES = 40
 # A rise above the best by the first factor is met at once, by the second when a state is to be
 # kept: a scene in which nothing is left to see costs two to four times the losses of its start.
+# Once losses have risen, the second is met at once as well: first steps at up to four times the
+# usual rates stay below it, those at ten times do not.
 _ASTRAY = 4.0
 _WORSE = 2.0
 # Below this (30 dB of a colour) a rise is no harm.
 _SMALL_LOSS = 1e-3
+# What the rates are multiplied with when a step is refused. Numbers that are not finite may come
+# from a single frame. Losses that have risen say that the rates are too high, and mostly by far:
+# too low ones leave the start as it is, too high ones end in something worse.
+_CUT = 0.5
+_CUT_AFTER_RISE = 0.125
 
 
 class TrainingDiverged(RuntimeError):
@@ -38,6 +45,7 @@ class GuardEvent:
 
     step: int
     what: str
+    rates: float = _CUT  # what they were multiplied with
 
 
 class Guard:
@@ -91,7 +99,8 @@ class Guard:
         for key, value in good.items():
             kind, name, *part = key.split("/")
             if kind == "moment":
-                self._moments.setdefault(named[name], {})[part[0]] = value
+                owner = named[name]
+                self._moments.setdefault(owner, {})[part[0]] = value.to(owner.device)
 
     def remember(self) -> None:
         """Take the present state as good, unless it is not finite."""
@@ -104,7 +113,7 @@ class Guard:
 
     def settle(self) -> str | None:
         """Remember the present state if the last steps prove it good; else their decline."""
-        enough = len(self.recent) == self.recent.maxlen
+        enough = len(self.recent) == self._window
         decline = self.decline() if enough else None
         if enough and decline is None:
             self.best = min(self.best, median(self.recent))
@@ -131,9 +140,33 @@ class Guard:
         bad = self._not_finite()
         if bad is not None:
             return f"{bad} is not finite"
+        known = len(self.recent)
         if terms:
             self.recent.append(sum(float(value.detach()) for value in terms.values()))
-        return self._risen(_ASTRAY) if len(self.recent) == self.recent.maxlen else None
+        if len(self.recent) < self._window:
+            return None
+        rise = self._risen(_WORSE if self._cautious else _ASTRAY)
+        return rise or (self._on_trial() if known < self._window else None)
+
+    @property
+    def _window(self) -> int:
+        """How many losses tell of a rise."""
+        assert self.recent.maxlen is not None
+        return self.recent.maxlen
+
+    def _on_trial(self) -> str | None:
+        """The first losses after a rise that have not risen again only tell which rates hold.
+
+        What barely holds has done harm already, and should be kept a distance from.
+        """
+        if self.events and self.events[-1].rates < _CUT:
+            return "the losses hold at last: again, at rates that are well below"
+        return None
+
+    @property
+    def _cautious(self) -> bool:
+        """Whether the rates have proven too high: the next rise is met earlier."""
+        return any(event.rates < _CUT for event in self.events)
 
     def _risen(self, factor: float) -> str | None:
         usual = median(self.recent) if self.recent else 0.0
@@ -163,12 +196,14 @@ class Guard:
         return next(n for (n, _), norm in zip(named, norms, strict=True) if not norm.isfinite())
 
     def refuse(self, step: int, what: str) -> None:
-        """Go back to the last good state and halve the rate.
+        """Go back to the last good state with lower rates: half, or less where losses have risen.
 
         Raises:
             TrainingDiverged: after more than the allowed number of events.
         """
-        self.events.append(GuardEvent(step, what))
+        rose = len(self.recent) >= _FEWEST_STEPS and self._risen(_WORSE) is not None
+        cut = _CUT_AFTER_RISE if rose else _CUT
+        self.events.append(GuardEvent(step, what, cut))
         if len(self.events) > self.allowed:
             raise TrainingDiverged(
                 f"stopped at step {step} after {len(self.events)} refused steps; the last: {what}. "
@@ -182,7 +217,7 @@ class Guard:
             self.optimiser.state.clear()
             for owner, moments in self._moments.items():
                 self.optimiser.state[owner] = {n: _copied(v) for n, v in moments.items()}
-        self.rate_scale *= 0.5
+        self.rate_scale *= cut
         self.recent.clear()
 
 

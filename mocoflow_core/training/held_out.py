@@ -119,22 +119,23 @@ class HeldOutScore:
         behind = clip.background.reshape(-1, 3)[held_out.pixels]
         return cls(
             scene,
-            rays,
-            torch.from_numpy(row),
-            near,
-            far,
+            rays.to(field.device),
+            torch.from_numpy(row).to(field.device),
+            near.to(field.device),
+            far.to(field.device),
             rgb.astype(np.float32) / 255.0,
-            torch.from_numpy(behind.astype(np.float32) / 255.0),
+            torch.from_numpy(behind.astype(np.float32) / 255.0).to(field.device),
         )
 
     @torch.no_grad()
     def __call__(self) -> float:
         """``train_psnr`` of the present weights, dB: over the background, no random numbers."""
         parts = [self._rendered(rows) for rows in self._chunks()]
-        return psnr(torch.cat(parts).numpy(), self.rgb)
+        return psnr(torch.cat(parts).cpu().numpy(), self.rgb)
 
     def _chunks(self) -> tuple[Tensor, ...]:
-        return torch.arange(len(self.rays)).split(self.scene.rays_at_once)
+        rows = torch.arange(len(self.rays), device=self.near.device)
+        return rows.split(self.scene.rays_at_once)
 
     def _rendered(self, rows: Tensor) -> Tensor:
         return self.scene.render(
@@ -143,5 +144,5 @@ class HeldOutScore:
             self.near[rows],
             self.far[rows],
             self.background[rows],
-            torch.full((len(rows), self.scene.jitters), 0.5),
+            torch.full((len(rows), self.scene.jitters), 0.5, device=rows.device),
         ).rgb

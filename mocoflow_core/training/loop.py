@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
+from typing import TypeVar
 
 import torch
+from pydantic import JsonValue
+from torch import Tensor
 
 from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
-from mocoflow_core.training.batches import PixelSource
+from mocoflow_core.training.averaged_weights import AveragedWeights
+from mocoflow_core.training.batches import Batch, PixelSource
 from mocoflow_core.training.checkpoint import (
     Progress,
     Restored,
-    load_checkpoint,
+    read_checkpoint,
     remove_checkpoint,
+    restore_checkpoint,
     save_checkpoint,
 )
 from mocoflow_core.training.clock import Seconds, TrainingClock, snapshot_due
 from mocoflow_core.training.guard import Guard
 from mocoflow_core.training.objective import Objective
 from mocoflow_core.training.pace import plan_pace, plan_rays
+from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
 from mocoflow_core.training.snapshots import Snapshot, forget_snapshots, keep_snapshot
 
@@ -33,13 +41,21 @@ _START_RAYS = 1024
 _START_FRAMES = 16
 
 Score = Callable[[], float]
+Chosen = TypeVar("Chosen", int, int | None)
+
+
+def unreported(share: float, text: str) -> None:
+    """The first rank reports for all."""
 
 
 class TrainingRun:
     """One optimisation, started or resumed.
 
     ``score`` is ``train_psnr`` of the held-out pixels, asked while the clock stands still; each
-    snapshot hands the curve so far to ``watch``. Without a watcher none are kept.
+    snapshot hands the curve so far to ``watch``. Without a watcher none are kept. ``made_with`` is
+    what a checkpoint must have been made with. Of several ranks each runs one; all take the same
+    decisions, as these depend on joint losses and on the first rank's clock, and only the first
+    one scores, writes and reports.
     """
 
     def __init__(
@@ -55,6 +71,8 @@ class TrainingRun:
         watch: Callable[[list[Snapshot]], None] | None,
         score: Score | None,
         clock: TrainingClock,
+        ranks: Ranks = ALONE,
+        made_with: Mapping[str, JsonValue] = MappingProxyType({}),
     ) -> None:
         self.field = field
         self.objective = objective
@@ -62,17 +80,20 @@ class TrainingRun:
         self.schedule = schedule
         self.before = before
         self.workspace = workspace
-        self.report = progress
+        self.report = progress if ranks.is_first else unreported
         self.watch = watch
         self.score = score
         self.clock = clock
+        self.ranks = ranks
+        self.made_with = made_with
         self.generator = torch.Generator().manual_seed(seed)
         # Torch loads its compiler with the first optimiser, for seconds: an import, not work.
         with clock.paused():
             self.optimiser = _optimiser(field, schedule)
+        self.average = AveragedWeights(field, schedule.averaging)
         self._base_rates = [group["lr"] for group in self.optimiser.param_groups]
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
-        restored = load_checkpoint(workspace, field, self.optimiser, self.generator)
+        restored = self._restored()
         self.progress = restored.progress if restored else self._first_start()
         self.guard = Guard(
             field,
@@ -86,22 +107,33 @@ class TrainingRun:
         self.guard.rate_scale = self.progress.rate_scale
         if restored:
             self._resume(restored)
-        forget_snapshots(workspace, self.progress.step)
+        ranks.first(lambda: forget_snapshots(workspace, self.progress.step))
         pace = plan_pace(schedule, before.wall, self.progress.started_s)
         self.pace = replace(pace, steps=self.progress.steps)
+
+    def _restored(self) -> Restored | None:
+        """What the first rank's workspace holds of an earlier try, of however many ranks."""
+        content = self.ranks.first_bytes(lambda: read_checkpoint(self.workspace))
+        if not content:
+            return None
+        parts = (self.field, self.optimiser, self.generator)
+        return restore_checkpoint(content, self.workspace, self.made_with, *parts)
 
     def _resume(self, restored: Restored) -> None:
         """Go on as if there had been no kill, but for the clock, which counts both tries."""
         progress = restored.progress
         progress.tries += 1
-        self.clock.go_on_from(progress.elapsed)
-        progress.elapsed = self.clock.read()
+        if self.ranks.is_first:
+            self.clock.go_on_from(progress.elapsed)
+        progress.elapsed = self._now()
         self._losses.extend(progress.losses)
         self.guard.restore(restored.good, progress.best, progress.recent)
+        self.average.restore(restored.means, progress.averaged)
 
     def run(self) -> None:
         """All remaining steps."""
-        with torch_threads(self.progress.threads):
+        self._shared = self.ranks.share(self.field, self.objective)
+        with torch_threads(self._threads(self.progress.threads)):
             self._steps()
 
     @property
@@ -114,17 +146,26 @@ class TrainingRun:
     def forget_checkpoint(self) -> None:
         remove_checkpoint(self.workspace)
 
+    def _now(self) -> Seconds:
+        """What the training clock shows, the same on all ranks."""
+        return self.ranks.seconds(self.clock.read())
+
+    def _threads(self, chosen: Chosen) -> Chosen | int:
+        """Several ranks on a machine are its threads already."""
+        return chosen if self.ranks.count == 1 else 1
+
     def _first_start(self) -> Progress:
         """What a resumed run must find again: threads, steps and rays."""
         schedule = self.schedule
-        threads = choose_threads(schedule.threads, self._try_out)
+        threads = choose_threads(self._threads(schedule.threads), self._try_out)
         rays = schedule.rays
         left_s = self._left_s()
         if left_s is not None and left_s > 0:
             with torch_threads(threads):
-                rays = plan_rays(schedule, left_s, seconds_of(self._try_out))
+                step_s = seconds_of(self._try_out)
+            rays = self.ranks.first(lambda: plan_rays(schedule, left_s, step_s))
         best = self._start_loss()
-        now = self.clock.read()
+        now = self._now()
         steps = plan_pace(schedule, self.before.wall, now.wall).steps
         return Progress(threads, steps, rays, started_s=now.wall, elapsed=now, best=best)
 
@@ -132,7 +173,7 @@ class TrainingRun:
         """What remains of a budget."""
         if self.schedule.budget_s is None:
             return None
-        return self.schedule.budget_s - (self.before + self.clock.read()).wall
+        return self.schedule.budget_s - (self.before + self._now()).wall
 
     def _steps(self) -> None:
         progress = self.progress
@@ -141,7 +182,7 @@ class TrainingRun:
         while not self._is_over(step_s):
             self._step(self.pace.share(progress.step, progress.elapsed.wall))
             progress.step += 1
-            started_s, progress.elapsed = progress.elapsed.wall, self.clock.read()
+            started_s, progress.elapsed = progress.elapsed.wall, self._now()
             step_s = progress.elapsed.wall - started_s
             self._look(progress.elapsed.wall)
             if progress.elapsed.wall - saved_s >= self.schedule.checkpoint_every_s:
@@ -151,6 +192,7 @@ class TrainingRun:
                 self.report(self.pace.share(progress.step, progress.elapsed.wall), self._text())
         self._go_back_if_bad()
         self._snapshot()
+        self.average.take()
 
     def _is_over(self, step_s: float) -> bool:
         progress = self.progress
@@ -165,7 +207,7 @@ class TrainingRun:
         """The work of a step without its effect: for choosing the number of threads."""
         generator = torch.Generator().manual_seed(0)
         batch = self.pixels.batch(self.schedule.rays, self.schedule.frames_per_step, generator)
-        torch.stack(list(self.objective(batch, generator).values())).sum().backward()
+        _sum(self.objective(self._mine(batch), generator)).backward()
         self.optimiser.zero_grad(set_to_none=True)
 
     @torch.no_grad()
@@ -177,9 +219,13 @@ class TrainingRun:
         rays = -(-max(self.schedule.rays, _START_RAYS) // batches)
         found = 0.0
         for _ in range(batches):
-            terms = self.objective(self.pixels.batch(rays, frames, generator), generator)
-            found += float(torch.stack(list(terms.values())).sum())
+            own = self._mine(self.pixels.batch(rays, frames, generator))
+            found += float(self.ranks.total(_sum(self.objective(own, generator))))
         return found / batches
+
+    def _mine(self, batch: Batch) -> Batch:
+        """All ranks draw the same rays; each looks along its own."""
+        return batch.part(self.ranks.part(len(batch.rays)), self.ranks.device)
 
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
@@ -190,9 +236,11 @@ class TrainingRun:
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
         batch = self.pixels.batch(self.progress.rays, schedule.frames_per_step, self.generator)
-        terms = self.objective(batch, self.generator)
+        own_terms = self._shared(self._mine(batch), self.generator)
         self.optimiser.zero_grad(set_to_none=True)
-        torch.stack(list(terms.values())).sum().backward()
+        # Gradients become means over ranks; the losses are sums over them.
+        (_sum(own_terms) * self.ranks.count).backward()
+        terms = _joint(own_terms, self.ranks)
         problem = self.pixels.problem(batch) or self.guard.problem(terms)
         # These weights have just given finite losses and gradients; the next ones are unknown.
         if problem is None and step % _REMEMBER_EVERY == 0:
@@ -201,11 +249,12 @@ class TrainingRun:
             self._refuse(problem)
             return
         self.optimiser.step()
+        self.average.update()
         self._losses.append({name: float(value.detach()) for name, value in terms.items()})
 
     def _refuse(self, problem: str) -> None:
         self.guard.refuse(self.progress.step, problem)
-        self.progress.rate_scale = self.guard.rate_scale
+        self.average.restart()
 
     def _go_back_if_bad(self) -> None:
         """The last update has not been seen by a step: nothing bad may be kept."""
@@ -228,21 +277,41 @@ class TrainingRun:
         self.progress.snapshot_s = self.progress.elapsed.wall
         psnr = self._train_psnr()
         with self.clock.paused():
-            now = self.progress.elapsed
-            self.watch(keep_snapshot(self.workspace, self.field, self.progress.step, now, psnr))
+            self.ranks.first(lambda: self._keep(psnr))
+
+    def _keep(self, psnr: float | None) -> None:
+        step, now = self.progress.step, self.progress.elapsed
+        with self.average.shown():
+            curve = keep_snapshot(self.workspace, self.field, step, now, psnr)
+        if self.watch is not None:
+            self.watch(curve)
 
     def _train_psnr(self) -> float | None:
-        with self.clock.paused():
-            return None if self.score is None else self.score()
+        with self.clock.paused(), self.average.shown():
+            return self.ranks.first(lambda: None if self.score is None else self.score())
 
     def _save(self) -> None:
         if self.guard.problem({}) is not None:
             return  # the next step refuses it
         progress, guard = self.progress, self.guard
         progress.best, progress.recent = guard.best, list(guard.recent)
+        progress.rate_scale = guard.rate_scale
         progress.losses = list(self._losses)
+        progress.averaged = self.average.steps
         parts = (self.field, self.optimiser, self.generator)
-        save_checkpoint(self.workspace, progress, *parts, guard.good_state())
+        states = (guard.good_state(), self.average.state())
+        save = partial(save_checkpoint, self.workspace, self.made_with, progress, *parts, *states)
+        self.ranks.first(save)
+
+
+def _sum(terms: Mapping[str, Tensor]) -> Tensor:
+    return torch.stack(list(terms.values())).sum()
+
+
+def _joint(terms: dict[str, Tensor], ranks: Ranks) -> dict[str, Tensor]:
+    """The losses of all rays."""
+    summed = ranks.total(torch.stack([value.detach() for value in terms.values()]))
+    return dict(zip(terms, summed, strict=True))
 
 
 def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:

@@ -63,6 +63,8 @@ class MeshViews:
         hit = far > near
         return Batch(
             through,
+            rays,
+            0,
             row,
             torch.where(hit, near, 0.0),
             torch.where(hit, far, 0.0),

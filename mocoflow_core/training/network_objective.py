@@ -12,6 +12,7 @@ from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.rendering.box_scene import BoxRays, BoxScene
 from mocoflow_core.training.batches import Batch
 from mocoflow_core.training.fit_points import FitPoints
+from mocoflow_core.training.ranks import ALONE, Ranks, own_of
 
 
 class NetworkObjective:
@@ -26,31 +27,35 @@ class NetworkObjective:
         losses: LossConfig,
         consensus: bool,
         fit_points: FitPoints | None = None,
+        ranks: Ranks = ALONE,
     ) -> None:
         self.scene = scene
         self.losses = losses
         self.consensus = consensus
         self.fit_points = fit_points
+        self.ranks = ranks
 
     def __call__(self, batch: Batch, generator: torch.Generator) -> dict[str, Tensor]:
-        weights = self.losses
+        weights, rays = self.losses, batch.rays_in_all
         rendered = self.scene.render(
             batch.rays, batch.row, batch.near, batch.far, batch.background, batch.jitter
         )
         terms = {
-            "photometric": photometric(rendered.rgb, batch.rgb),
-            "photometric_coarse": photometric(rendered.coarse_rgb, batch.rgb),
+            "photometric": photometric(rendered.rgb, batch.rgb, rays),
+            "photometric_coarse": photometric(rendered.coarse_rgb, batch.rgb, rays),
         }
         if weights.silhouette_weight > 0:
             mask = batch.mask * batch.has_mask
             terms["silhouette"] = weights.silhouette_weight * (
-                silhouette(rendered.opacity * batch.has_mask, mask)
-                + silhouette(rendered.coarse_opacity * batch.has_mask, mask)
+                silhouette(rendered.opacity * batch.has_mask, mask, rays)
+                + silhouette(rendered.coarse_opacity * batch.has_mask, mask, rays)
             )
         if self.consensus and weights.consensus_weight > 0:
             terms["consensus"] = weights.consensus_weight * self._consensus(rendered, generator)
         if self.fit_points is not None and weights.fit_weight > 0:
-            terms["fit"] = weights.fit_weight * self._fit(int(batch.row[0]), generator)
+            # Of no ray: each rank brings an equal part.
+            fit = self._fit(batch.first_row, generator) / self.ranks.count
+            terms["fit"] = weights.fit_weight * fit
         return terms
 
     def _consensus(self, rendered: BoxRays, generator: torch.Generator) -> Tensor:
@@ -59,18 +64,19 @@ class NetworkObjective:
         moments = len(scene.boxes.times)
         other = torch.randint(moments, (1,), generator=generator).to(rendered.row)
         solid = (rendered.density.detach() > weights.density_threshold).nonzero()[:, 0]
-        if weights.consensus_points is not None and len(solid) > weights.consensus_points:
-            solid = solid[
-                torch.randint(len(solid), (weights.consensus_points,), generator=generator)
-            ]
+        earlier, everywhere = self.ranks.before(len(solid))
+        if weights.consensus_points is not None and everywhere > weights.consensus_points:
+            pick = torch.randint(everywhere, (weights.consensus_points,), generator=generator)
+            solid = solid[own_of(pick.to(solid), earlier, len(solid))]
         points, row = rendered.samples.points[solid], rendered.row[solid]
         mapped = (rendered.canonical[solid], torch.ones_like(row, dtype=torch.bool))
         moves = (scene.to_canonical, scene.to_observed, points, row)
         loss = points.new_zeros(())
         if weights.local_share > 0:
-            loss = loss + weights.local_share * local_consensus(*moves, mapped)
+            local = local_consensus(*moves, mapped, self.ranks.total)
+            loss = loss + weights.local_share * local
         if weights.global_share > 0:
-            far = global_consensus(*moves, other.expand_as(row), mapped)
+            far = global_consensus(*moves, other.expand_as(row), mapped, self.ranks.total)
             loss = loss + weights.global_share * far
         return loss
 

@@ -35,6 +35,7 @@ from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.mesh_views import MeshViews, MeshViewsConfig
 from mocoflow_core.training.network_objective import NetworkObjective
 from mocoflow_core.training.problem import Learned, Problem
+from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 
 _WEIGHTS = "model.safetensors"
@@ -106,9 +107,10 @@ def pretrain_networks(
         parameter.requires_grad_(False)
     row = int(np.flatnonzero(clip.frame_indices == canonical_frame)[0])
     scene = space.at(field, torch.tensor([clip.times[row]]))
-    objective = NetworkObjective(scene, LossConfig(silhouette_weight=0.0), consensus=False)
+    losses, learned = LossConfig(silhouette_weight=0.0), Learned(False, False, False)
+    objective = NetworkObjective(scene, losses, consensus=False)
     pixels = MeshViews(space.canonical_vertices, meshes.faces, scene, views)
-    problem = Problem(space, field, scene, objective)
+    problem = Problem(space, field, scene, objective, _settings(space, learned, losses))
     result = _train(problem, pixels, schedule, seed, workspace, progress, clock)
     require_density(field, space.canonical_vertices)
     return result
@@ -148,30 +150,46 @@ def fit_networks(
     consensus = learned.consensus and field.moves
     objective = NetworkObjective(scene, losses, consensus, points if field.moves else None)
     pixels = TrainingPixels(clip, scene, draw_held_out(clip, schedule.held_out_pixels))
-    fitting = Problem(space, field, scene, objective)
+    settings = _settings(space, learned, losses)
+    fitting = Problem(space, field, scene, objective, settings)
     return _train(fitting, pixels, schedule, seed, workspace, progress, clock)
 
 
 def network_problem(
-    folder: Path, clip: Clip, learned: Learned, losses: LossConfig, seed: int
+    folder: Path,
+    clip: Clip,
+    learned: Learned,
+    losses: LossConfig,
+    seed: int,
+    ranks: Ranks = ALONE,
 ) -> Problem:
     """The joint optimisation of all networks, from the weights that a stage before has left.
 
     Raises FileNotFoundError where a part is missing: nothing starts from scratch in silence.
     """
-    space, field, scene = _opened(folder, clip, learned, seed)
-    objective = NetworkObjective(scene, losses, learned.consensus and field.moves)
-    return Problem(space, field, scene, objective)
+    space, field, scene = _opened(folder, clip, learned, seed, ranks)
+    consensus = learned.consensus and field.moves
+    objective = NetworkObjective(scene, losses, consensus, ranks=ranks)
+    return Problem(space, field, scene, objective, _settings(space, learned, losses), ranks)
+
+
+def _settings(space: BoxSpace, learned: Learned, losses: LossConfig) -> dict[str, JsonValue]:
+    return {
+        "shape": space.shape.model_dump(mode="json"),
+        "learned": asdict(learned),
+        "losses": losses.model_dump(mode="json"),
+    }
 
 
 def _opened(
-    folder: Path, clip: Clip, learned: Learned, seed: int
+    folder: Path, clip: Clip, learned: Learned, seed: int, ranks: Ranks = ALONE
 ) -> tuple[BoxSpace, NetworkField, BoxScene]:
     """What a stage before has left, and the scene at the training frames."""
     torch.manual_seed(seed)
     space = BoxSpace.load(folder)
     field = space.build()
     field.load_state_dict(load_file(folder / _WEIGHTS))
+    field.to(ranks.device)
     field.appearance.requires_grad_(learned.appearance_codes)
     for parameter in field.motion_parameters():
         parameter.requires_grad_(field.moves)
@@ -226,6 +244,8 @@ def _train(
         None,
         None,
         clock or TrainingClock(),
+        problem.ranks,
+        {**problem.settings, "schedule": schedule.deciding(), "seed": seed},
     )
     run.run()
     save_file(problem.field.state_dict(), workspace / _WEIGHTS)

@@ -20,6 +20,8 @@ from mocoflow_core.training.problem import Problem
 from mocoflow_core.training.schedule import ScheduleConfig
 from mocoflow_core.training.snapshots import Snapshot, read_snapshots
 
+RESULT = "result.json"
+
 
 @dataclass(frozen=True)
 class OptimisationResult:
@@ -36,6 +38,11 @@ class OptimisationResult:
     train_psnr: float | None  # dB, of the held-out pixels at the end
     held_out: str  # what these are
     warnings: tuple[str, ...]
+
+    @classmethod
+    def from_json(cls, text: str) -> OptimisationResult:
+        values = json.loads(text)
+        return cls(**{**values, "warnings": tuple(values["warnings"])})
 
 
 def unwatched(curve: list[Snapshot]) -> None:
@@ -59,7 +66,9 @@ def optimise_scene(
     ``snapshots/%06d.safetensors`` at geometric times with ``snapshots.json``, and ``result.json``.
 
     Args:
-        problem: what is learned and from what; its field is trained in place.
+        problem: what is learned and from what; its field is trained in place. Where several ranks
+            share its rays, each calls this with the same arguments and gets the same result; the
+            first alone writes, reports and is watched.
         before: training clock of the stages so far.
         workspace: folder that survives a kill.
         watch: is given all snapshots so far whenever there is a new one.
@@ -67,20 +76,20 @@ def optimise_scene(
 
     Raises:
         InputError: a train_psnr to reach, on a scene without any mask to measure it on.
+            A checkpoint that was made with other settings.
         TrainingDiverged: after too many non-finite steps.
 
     Source: MoCo-Flow sec. 3.4, third stage.
     """
-    clock = clock or TrainingClock()
+    clock, ranks = clock or TrainingClock(), problem.ranks
     with clock.paused():
         held_out = draw_held_out(clip, schedule.held_out_pixels)
         _require_pixels_to_score(held_out, schedule)
         score = None
-        if held_out is not None:
+        if held_out is not None and ranks.is_first:
             score = HeldOutScore.prepare(clip, held_out, problem.space, problem.field)
     pixels = TrainingPixels(clip, problem.scene, held_out)
-    workspace.mkdir(parents=True, exist_ok=True)
-    problem.space.save(workspace)
+    ranks.first(lambda: _begin(problem, workspace))
     run = TrainingRun(
         problem.field,
         problem.objective,
@@ -93,11 +102,23 @@ def optimise_scene(
         watch,
         score,
         clock,
+        problem.ranks,
+        {**problem.settings, "schedule": schedule.deciding(), "seed": seed},
     )
     run.run()
-    save_file(problem.field.state_dict(), workspace / "model.safetensors")
-    result = _result(run, before, held_out)
-    (workspace / "result.json").write_text(json.dumps(asdict(result)))
+    return OptimisationResult.from_json(ranks.first(lambda: _finish(run, before, held_out)))
+
+
+def _begin(problem: Problem, workspace: Path) -> None:
+    workspace.mkdir(parents=True, exist_ok=True)
+    problem.space.save(workspace)
+
+
+def _finish(run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None) -> str:
+    """Write the trained weights and the result, and drop the checkpoint."""
+    save_file(run.field.state_dict(), run.workspace / "model.safetensors")
+    result = json.dumps(asdict(_result(run, before, held_out)))
+    (run.workspace / RESULT).write_text(result)
     run.forget_checkpoint()
     return result
 

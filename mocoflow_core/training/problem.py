@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import torch
+from pydantic import JsonValue
 
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.scene_field import SceneField
@@ -14,6 +15,7 @@ from mocoflow_core.rendering.posed_scene import PosedScene, Space
 from mocoflow_core.rendering.shell_space import ShellSpace
 from mocoflow_core.training.fit_motion import MotionStart
 from mocoflow_core.training.objective import Objective, ShellObjective
+from mocoflow_core.training.ranks import ALONE, Ranks
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,8 @@ class Problem:
     field: SceneField
     scene: PosedScene
     objective: Objective
+    settings: dict[str, JsonValue]  # that make it this problem and no other
+    ranks: Ranks = ALONE  # that share its rays
 
 
 def shell_problem(
@@ -42,15 +46,22 @@ def shell_problem(
     learned: Learned,
     losses: LossConfig,
     seed: int,
+    ranks: Ranks = ALONE,
 ) -> Problem:
     """The fast representation: the body's motion with a residual, a grid on top of the mesh."""
     torch.manual_seed(seed)
     space = ShellSpace(shape, density, motion.controls)
-    field = space.build()
+    field = space.build().to(ranks.device)
     _freeze_what_is_not_needed(field, learned)
     scene = space.at_training_frames(field, motion.body)
     weights = losses if learned.consensus else losses.model_copy(update={"consensus_weight": 0.0})
-    return Problem(space, field, scene, ShellObjective(scene, weights, learned.motion_residual))
+    objective = ShellObjective(scene, weights, learned.motion_residual, ranks)
+    settings: dict[str, JsonValue] = {
+        "shape": shape.model_dump(mode="json"),
+        "learned": asdict(learned),
+        "losses": losses.model_dump(mode="json"),
+    }
+    return Problem(space, field, scene, objective, settings, ranks)
 
 
 def _freeze_what_is_not_needed(field: SceneField, learned: Learned) -> None:

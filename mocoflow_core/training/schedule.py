@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from mocoflow_core.configuration import ConfigurationPart
 
@@ -29,6 +29,10 @@ class ScheduleConfig(ConfigurationPart):
     adam_beta2: float = Field(0.99, ge=0, lt=1, description="decay of Adam's second moment")
     adam_epsilon: float = Field(1e-10, gt=0, description="Adam's smallest divisor")
     final_rate: float = Field(0.1, gt=0, le=1, description="last rate as a share of the first")
+    # Up to 0.1 dB at unseen views for 1 % of a step: benchmarks/falling_curves.md.
+    averaging: float = Field(
+        0.97, ge=0, lt=1, description="of the weights' running mean, kept by a step; 0: no mean"
+    )
     budget_s: float | None = Field(None, gt=0, description="seconds of the training clock in all")
     # On synthetic scenes twice the steps or twice the rays brought 0.06 dB and -0.2 dB at unseen
     # views, four times the steps -0.2 dB: a larger budget is given back.
@@ -48,6 +52,10 @@ class ScheduleConfig(ConfigurationPart):
     )
     checkpoint_every_s: float = Field(5.0, gt=0, description="a kill loses at most this much work")
     threads: int | None = Field(None, ge=1, description="forced; otherwise chosen by a probe")
+
+    def deciding(self) -> dict[str, JsonValue]:
+        """The fields that decide where a run ends, and not only how it gets there."""
+        return self.model_dump(mode="json", exclude={"threads", "checkpoint_every_s"})
 
     @property
     def joint_steps(self) -> int:

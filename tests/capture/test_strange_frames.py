@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.capture.strange_frames import listed, sound_clip
+from mocoflow_core.capture.strange_frames import listed, measure_frames, sound_clip
 from mocoflow_core.geometry.camera import Camera
 
 FRAMES, SIDE = 12, 64
@@ -100,6 +100,53 @@ def test_a_mask_that_jumps_in_size_is_named(clip):
     masks[6, :26] = False
     _, warnings = sound_clip(replace(clip, masks=masks), THRESHOLD)
     assert any("frame 12 of cam with a mask of another size" in words for words in warnings)
+
+
+HELD_OUT = np.arange(FRAMES) % 3 == 1
+HELD_OUT_BESIDE = np.isin(np.arange(FRAMES), [5, 7])
+SPOILT_MASKS = np.zeros((SIDE, SIDE), bool), np.ones((SIDE, SIDE), bool)
+
+
+@pytest.mark.parametrize("mask", SPOILT_MASKS, ids=["empty", "full"])
+@pytest.mark.parametrize("broken_row", [None, 3, 6])
+def test_nothing_in_held_out_frames_changes_what_is_said_of_training_frames(clip, mask, broken_row):
+    if broken_row is not None:
+        clip = with_frame(clip, broken_row, clip.frames[11])
+        clip.masks[broken_row] = False
+    clip = replace(clip, held_out=HELD_OUT)
+    frames, masks = clip.frames.copy(), clip.masks.copy()
+    frames[HELD_OUT], masks[HELD_OUT] = 255 - frames[HELD_OUT], mask
+    spoilt = replace(clip, frames=frames, masks=masks)
+    assert _believed(clip) == _believed(spoilt)
+    before, after = measure_frames(clip, THRESHOLD), measure_frames(spoilt, THRESHOLD)
+    for name in ("changed", "surplus", "detour"):
+        ours, theirs = getattr(before, name), getattr(after, name)
+        assert ours[~HELD_OUT].tolist() == theirs[~HELD_OUT].tolist()
+
+
+def _believed(clip) -> dict[int, bool]:
+    """The training frames that stay, and whether their masks are believed."""
+    found = sound_clip(clip, THRESHOLD)[0]
+    training = ~found.held_out
+    numbers, masks = found.frame_indices[training], found.has_mask[training]
+    return dict(zip(numbers.tolist(), masks.tolist(), strict=True))
+
+
+def test_a_mask_that_jumps_between_held_out_ones_that_jump_too_is_named(clip):
+    masks = clip.masks.copy()
+    masks[5:8, 32:] = False
+    masks[5:8, :26] = False
+    _, warnings = sound_clip(replace(clip, masks=masks, held_out=HELD_OUT_BESIDE), THRESHOLD)
+    assert any("frame 12 of cam with a mask of another size" in words for words in warnings)
+
+
+def test_held_out_frames_alone_break_no_plate(clip):
+    held_out = np.arange(FRAMES) < 3
+    frames = clip.frames.copy()
+    frames[:3] = 255
+    found, warnings = sound_clip(replace(clip, frames=frames, held_out=held_out), THRESHOLD)
+    assert found.frame_indices.tolist() == clip.frame_indices[3:].tolist()
+    assert not any("differ from the background" in words for words in warnings)
 
 
 def test_numbers_are_listed_in_runs():

@@ -24,3 +24,14 @@ def test_opacity_at_its_ends_has_a_finite_gradient():
     opacity = torch.tensor([0.0, 1.0, 0.0, 1.0], requires_grad=True)
     silhouette(opacity, torch.tensor([0.0, 0.0, 1.0, 1.0])).backward()
     assert opacity.grad.tolist() == pytest.approx([0.0, 0.5, -0.5, 0.0])
+
+
+def test_parts_of_a_step_add_up_to_its_mean():
+    generator = torch.Generator().manual_seed(0)
+    rendered, observed = torch.rand(2, 30, 3, generator=generator)
+    opacity, mask = torch.rand(2, 30, generator=generator)
+    parts = (slice(0, 7), slice(7, 7), slice(7, 30))
+    colours = sum(float(photometric(rendered[p], observed[p], 30)) for p in parts)
+    outlines = sum(float(silhouette(opacity[p], mask[p], 30)) for p in parts)
+    assert colours == pytest.approx(float(((rendered - observed) ** 2).mean()), rel=1e-5)
+    assert outlines == pytest.approx(float(((opacity - mask) ** 2).mean()), rel=1e-5)

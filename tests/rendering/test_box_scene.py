@@ -56,6 +56,8 @@ def batch(rays: int = 120) -> Batch:
     hit = far > near
     return Batch(
         through,
+        rays,
+        int(row[0]),
         row,
         torch.where(hit, near, 0.0),
         torch.where(hit, far, 0.0),

@@ -43,6 +43,12 @@ def test_a_watched_number_that_is_not_finite_fails_however_small_the_error(plant
         assert not row.finite
 
 
+@pytest.mark.parametrize("error", [np.nan, np.float64(0.5), np.float64(2.0)])
+def test_a_verdict_is_plain_whatever_kind_of_number_the_error_is(error):
+    row = measured(lambda x: Found(error))
+    assert type(row.passed) is type(row.finite) is bool
+
+
 def test_whatever_is_raised_is_a_failure_with_its_words():
     def refused(x):
         raise InputError("a b", "c", "Do d.")

@@ -4,16 +4,34 @@ import pytest
 
 from tests.one_thread import one_thread  # noqa: F401
 from tests.toy_training import prepare, train, write_toy
+from tests.two_ranks import TwoRanks
 
 
 @pytest.fixture(scope="session")
-def prepared(tmp_path_factory):
-    return prepare(write_toy(tmp_path_factory.mktemp("scene") / "toy"))
+def toy_folder(tmp_path_factory):
+    return write_toy(tmp_path_factory.mktemp("scene") / "toy")
 
 
 @pytest.fixture(scope="session")
-def trained(prepared, tmp_path_factory):
+def prepared(toy_folder):
+    return prepare(toy_folder)
+
+
+@pytest.fixture(scope="session")
+def alone(prepared, tmp_path_factory):
+    """The folder of an undisturbed run of one process, and its result."""
+    folder = tmp_path_factory.mktemp("trained") / "run"
+    return folder, train(prepared, folder)
+
+
+@pytest.fixture(scope="session")
+def trained(alone):
     """The folder of an undisturbed run."""
-    folder = tmp_path_factory.mktemp("trained")
-    train(prepared, folder)
-    return folder
+    return alone[0]
+
+
+@pytest.fixture(scope="session")
+def two_ranks():
+    ranks = TwoRanks()
+    yield ranks
+    ranks.close()

@@ -244,6 +244,54 @@ def test_after_a_refusal_old_losses_are_forgotten_and_a_few_new_ones_prove_nothi
     assert run.guard.decline() is None
 
 
+def test_after_a_rise_the_rates_are_cut_further_than_after_a_number_that_is_not_finite():
+    run = Run()
+    run.guard.expect(0.02)
+    run.guard.refuse(3, "gradient")
+    halved = run.guard.rate_scale
+    look(run, 0.1, 10)
+    run.guard.refuse(14, "risen")
+    assert run.guard.rate_scale < 0.5 * halved == 0.25
+
+
+def test_what_the_last_losses_say_decides_the_cut_whatever_the_reason():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.05, 5)
+    run.guard.refuse(6, "gradient of 0.weight is not finite")
+    assert run.guard.events[0].rates == run.guard.rate_scale < 0.5
+
+
+def test_after_a_rise_the_next_one_is_met_earlier():
+    run = Run()
+    run.guard.expect(0.02)
+    assert look(run, 0.07, 10) is None
+    look(run, 0.2, 10)
+    run.guard.refuse(20, "risen")
+    assert "risen" in look(run, 0.07, 10)
+
+
+def test_rates_that_hold_after_a_rise_are_a_trial_and_lower_ones_start_from_the_good_state():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.2, 10)
+    run.guard.refuse(10, "risen")
+    tried = run.guard.rate_scale
+    assert look(run, 0.02, 9) is None
+    assert "hold" in look(run, 0.02, 1)
+    run.guard.refuse(20, "hold")
+    assert run.guard.rate_scale == 0.5 * tried
+    assert look(run, 0.02, 30) is None  # one trial is enough
+
+
+def test_a_refusal_without_a_rise_leaves_the_guard_as_patient_as_it_was():
+    run = Run()
+    run.guard.expect(0.02)
+    look(run, 0.02, 10)
+    run.guard.refuse(10, "gradient of 0.weight is not finite")
+    assert look(run, 0.07, 10) is None
+
+
 def test_a_run_of_a_step_or_two_without_any_refusal_is_not_judged():
     run = Run()
     run.guard.expect(0.02)
