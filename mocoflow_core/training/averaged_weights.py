@@ -48,7 +48,7 @@ class AveragedWeights:
     def restore(self, means: Mapping[str, Tensor], steps: int) -> None:
         """Go on as the average whose ``state`` and ``steps`` these are."""
         self.steps = steps
-        self._means = [means[name].clone() for name in self._learned]
+        self._means = [means[name].to(own).clone() for name, own in self._learned.items()]
 
     def take(self) -> None:
         """Give the model its means for good."""
