@@ -51,7 +51,7 @@ def reconstruct(
         settings: single fields, such as ``schedule.fine_steps=200``.
         store: folder or fsspec address of the artifact store.
         devices: GPUs, or cores where there are none, that share the optimisation; by default all
-            GPUs, or one process without any.
+            GPUs where there are several, else one process on the CPU.
         machines: that have so many devices each and the store at the same path.
         rendezvous: ``host:port`` at which several machines meet.
     """

@@ -94,12 +94,13 @@ def _contradictions(chosen: Configuration) -> Iterator[Contradiction]:
     plan, losses, schedule = chosen.plan, chosen.losses, chosen.schedule
     if plan.motion_consensus == "on":
         yield from _consensus_of_nothing(chosen)
-    if chosen.representation == "networks" and plan.initialisation == "on":
-        if schedule.pretrain_steps == schedule.fit_steps == 0:
+    if chosen.representation == "networks" and plan.initialisation != "off":
+        steps = (schedule.pretraining().joint_steps, schedule.fitting().joint_steps)
+        if 0 in steps:
             yield Contradiction(
-                "plan.initialisation=on needs steps",
-                "schedule.pretrain_steps=0 and schedule.fit_steps=0",
-                "Give one of them steps, or set plan.initialisation=off.",
+                "plan.initialisation needs steps in both of its stages",
+                f"{steps[0]} of pretraining and {steps[1]} of fitting the motion",
+                "Raise schedule.pretrain_steps, fit_steps or scale; or plan.initialisation=off.",
             )
     if schedule.first_bands > schedule.last_bands:
         yield Contradiction(

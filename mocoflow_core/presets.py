@@ -73,7 +73,15 @@ def paper() -> Configuration:
     """
     return Configuration(
         representation="networks",
-        plan=PlanConfig(body_repair="off", canonical_frame="first"),
+        # What the paper always has, whatever a scene shows.
+        plan=PlanConfig(
+            body_repair="off",
+            motion_fields="on",
+            appearance_codes="on",
+            initialisation="on",
+            adaptive_box="on",
+            canonical_frame="first",
+        ),
         losses=LossConfig(silhouette_weight=0.0, consensus_points=None),
         schedule=ScheduleConfig(
             pretrain_steps=200_000,

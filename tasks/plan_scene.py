@@ -18,7 +18,7 @@ from mocoflow_core.planning.preparation import decide_frames, decide_preparation
 from mocoflow_core.planning.visibility import visibility_warnings
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 3  # A representation has decisions of its own.
+ALGORITHM_VERSION = 4  # Brightness is compared between training frames alone.
 
 
 @stage(PlanArtifact, ALGORITHM_VERSION)

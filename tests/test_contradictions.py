@@ -66,9 +66,22 @@ def test_a_value_that_the_preset_has_already_was_set_by_nobody():
 
 
 def test_another_representation_may_be_put_on_a_preset_with_its_own_fields():
-    check("toy", "representation=networks", "networks.colour_width=8")
+    networks = ("representation=networks", "schedule.pretrain_steps=5", "schedule.fit_steps=5")
+    check("toy", *networks, "networks.colour_width=8")
     with pytest.raises(InputError, match=r"density\.spacing_m"):
-        check("toy", "representation=networks", "density.spacing_m=0.01")
+        check("toy", *networks, "density.spacing_m=0.01")
+
+
+def test_networks_never_start_from_scratch_in_silence():
+    # A preset without stages of theirs, one stage left out, a scale that rounds both away.
+    for preset, setting in (
+        ("toy", "representation=networks"),
+        ("paper", "schedule.pretrain_steps=0"),
+        ("paper", "schedule.scale=1e-6"),
+    ):
+        with pytest.raises(InputError, match=r"plan\.initialisation"):
+            check(preset, setting)
+    check("paper", "schedule.scale=1e-6", "plan.initialisation=off")
 
 
 def test_settings_of_a_repair_that_the_preset_leaves_out_are_refused():

@@ -23,13 +23,14 @@ def decide_motion(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -
         reason="the body moves" if moves else "the body stands still",
         evidence={"moved_px": moved_px},
         threshold=configuration.still_px,
-        saves="a look-up table of the motion for each frame: all frames share one",
+        saves="the motion of each frame: all frames share one",
     ).forced(configuration.motion_fields)
 
 
 def decide_appearance(clip: Clip, meshes: MeshSequence, configuration: PlanConfig) -> Decision:
     """Whether each image needs an appearance code of its own."""
-    shifts = brightness_shifts(clip, meshes)[~clip.held_out]
+    training = ~clip.held_out
+    shifts = brightness_shifts(clip.at_rows(training), meshes.at(clip.frame_indices[training]))
     known = shifts[np.isfinite(shifts)]
     changes = float(np.percentile(np.abs(known), 95)) if len(known) else float("nan")
     varies = not changes <= configuration.constant_brightness

@@ -42,15 +42,18 @@ class FrameBoxes:
     times: Tensor  # (F,) normalised, ascending
     lower: Tensor  # (F, 3) metres, in the boxes' axes
     upper: Tensor  # (F, 3)
+    middles: Tensor  # (F, 3) of the frames' own meshes, in the boxes' axes
 
     def to(self, device: torch.device) -> FrameBoxes:
-        parts = (self.rotation, self.times, self.lower, self.upper)
+        parts = (self.rotation, self.times, self.lower, self.upper, self.middles)
         return FrameBoxes(*(part.to(device) for part in parts))
 
     def at(self, times: Tensor) -> FrameBoxes:
         """Boxes at any times (G,), linear between frames."""
-        lower, upper = (interpolate_rows(v, self.times, times) for v in (self.lower, self.upper))
-        return FrameBoxes(self.rotation, times, lower, upper)
+        parts = (self.lower, self.upper, self.middles)
+        return FrameBoxes(
+            self.rotation, times, *(interpolate_rows(part, self.times, times) for part in parts)
+        )
 
     def intersect(self, rays: Rays, row: Tensor) -> tuple[Tensor, Tensor]:
         """Entry and exit (R,) of each ray through its moment's box; far <= near where it misses."""
@@ -58,9 +61,8 @@ class FrameBoxes:
         return intersect_boxes(turned, self.lower[row], self.upper[row])
 
     def middle(self, row: int) -> NDArray[np.float64]:
-        """Centre of one box, (3,) world metres."""
-        middle = 0.5 * (self.lower[row] + self.upper[row])
-        return (middle @ self.rotation).double().numpy()
+        """Middle of one frame's mesh, (3,) world metres, also where one box holds the clip."""
+        return (self.middles[row] @ self.rotation).double().numpy()
 
     @property
     def mean_depth_m(self) -> float:
@@ -96,7 +98,10 @@ def frame_boxes(
     turned = vertices.astype(np.float64) @ camera.R.T
     margin = np.array([configuration.margin_xy_m] * 2 + [configuration.margin_z_m])
     lower, upper = turned.min(1) - margin, turned.max(1) + margin
+    middles = 0.5 * (lower + upper)
     if follows == "clip":
         lower[:], upper[:] = lower.min(0), upper.max(0)
-    rotation, low, high = (torch.from_numpy(v).float() for v in (camera.R, lower, upper))
-    return FrameBoxes(rotation, torch.from_numpy(times.astype(np.float64)), low, high)
+    rotation, *parts = (
+        torch.from_numpy(part).float() for part in (camera.R, lower, upper, middles)
+    )
+    return FrameBoxes(rotation, torch.from_numpy(times.astype(np.float64)), *parts)

@@ -64,10 +64,11 @@ class PixelSource(Protocol):
 
 
 class TrainingPixels:
-    """The training frames of a clip and, per frame, the pixels that can show the person.
+    """The training frames of a clip and, per frame, the pixels that the scene sends rays through.
 
-    The others show the background whatever is learned, so no ray goes there; nor to those that are
-    held out to score the run. Raises InputError where the body is in sight of no frame.
+    Of the fast representation those that can show the person, of the paper's networks all. Pixels
+    that are held out to score the run are none of them. Raises InputError where the body is in
+    sight of no frame.
     """
 
     def __init__(
@@ -97,7 +98,7 @@ class TrainingPixels:
         # A person who has left the picture leaves a frame without candidates.
         self.in_sight = self.counts.nonzero()[:, 0]
         self.numbers = clip.frame_indices[rows]
-        if not len(self.in_sight):
+        if not (self.farthest > self.nearest).any():
             raise InputError(
                 f"the body must be in sight of {clip.camera.name} in a training frame",
                 f"one beside or behind the camera in all {len(rows)}",

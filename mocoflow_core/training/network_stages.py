@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -170,7 +171,9 @@ def network_problem(
     space, field, scene = _opened(folder, clip, learned, seed, ranks)
     consensus = learned.consensus and field.moves
     objective = NetworkObjective(scene, losses, consensus, ranks=ranks)
-    return Problem(space, field, scene, objective, _settings(space, learned, losses), ranks)
+    settings = _settings(space, learned, losses)
+    faults = partial(missing_density, field, space.canonical_vertices)
+    return Problem(space, field, scene, objective, settings, ranks, faults)
 
 
 def _settings(space: BoxSpace, learned: Learned, losses: LossConfig) -> dict[str, JsonValue]:
@@ -257,21 +260,29 @@ def _train(
     return result
 
 
-@torch.no_grad()
 def require_density(field: NetworkField, vertices: NDArray[np.float32]) -> None:
     """A ReLU that has ended below zero everywhere has no gradient to come back.
 
     Raises TrainingDiverged where most of the canonical mesh's vertices (V, 3) have no density.
     """
+    for fault in missing_density(field, vertices):
+        raise TrainingDiverged(
+            f"{fault} after pretraining. Lower schedule.rate_networks or "
+            "networks.density_unit_per_m, raise mesh_views.on_body, or take another --seed."
+        )
+
+
+@torch.no_grad()
+def missing_density(field: NetworkField, vertices: NDArray[np.float32]) -> tuple[str, ...]:
+    """The networks that have no density on most of the canonical mesh's vertices (V, 3)."""
+    found = []
     for name, network in (("coarse", field.coarse), ("fine", field.fine)):
-        density, _ = field.density(network, torch.from_numpy(vertices))
+        density, _ = field.density(network, torch.from_numpy(vertices).to(field.centre))
         empty = float((density == 0).float().mean())
         if empty > _MOST_EMPTY:
-            raise TrainingDiverged(
-                f"the {name} network has no density on {100 * empty:.0f} % of the canonical mesh "
-                "after pretraining. Lower schedule.rate_networks or networks.density_unit_per_m, "
-                "raise mesh_views.on_body, or take another --seed."
-            )
+            share = f"{100 * empty:.0f} % of the canonical mesh"
+            found.append(f"the {name} network has no density on {share}")
+    return tuple(found)
 
 
 def _untrained(field: NetworkField, workspace: Path) -> StageResult:

@@ -106,7 +106,9 @@ def optimise_scene(
         {**problem.settings, "schedule": schedule.deciding(), "seed": seed},
     )
     run.run()
-    return OptimisationResult.from_json(ranks.first(lambda: _finish(run, before, held_out)))
+    return OptimisationResult.from_json(
+        ranks.first(lambda: _finish(run, before, held_out, problem.faults()))
+    )
 
 
 def _begin(problem: Problem, workspace: Path) -> None:
@@ -114,10 +116,12 @@ def _begin(problem: Problem, workspace: Path) -> None:
     problem.space.save(workspace)
 
 
-def _finish(run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None) -> str:
+def _finish(
+    run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None, faults: tuple[str, ...]
+) -> str:
     """Write the trained weights and the result, and drop the checkpoint."""
     save_file(run.field.state_dict(), run.workspace / "model.safetensors")
-    result = json.dumps(asdict(_result(run, before, held_out)))
+    result = json.dumps(asdict(_result(run, before, held_out, faults)))
     (run.workspace / RESULT).write_text(result)
     run.forget_checkpoint()
     return result
@@ -133,7 +137,7 @@ def _require_pixels_to_score(held_out: HeldOutPixels | None, schedule: ScheduleC
 
 
 def _result(
-    run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None
+    run: TrainingRun, before: Seconds, held_out: HeldOutPixels | None, faults: tuple[str, ...]
 ) -> OptimisationResult:
     progress = run.progress
     train_psnr = read_snapshots(run.workspace)[-1].train_psnr
@@ -148,7 +152,7 @@ def _result(
         run.recent_losses,
         train_psnr,
         held_out.description if held_out else "",
-        _warnings(progress, train_psnr, before, run.schedule),
+        (*_warnings(progress, train_psnr, before, run.schedule), *faults),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import torch
@@ -37,6 +38,7 @@ class Problem:
     objective: Objective
     settings: dict[str, JsonValue]  # that make it this problem and no other
     ranks: Ranks = ALONE  # that share its rays
+    faults: Callable[[], tuple[str, ...]] = tuple  # sentences about the present weights
 
 
 def shell_problem(

@@ -10,6 +10,8 @@ import pytest
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.planning.brightness import brightness_shifts
+from mocoflow_core.planning.clip_decisions import decide_appearance
+from mocoflow_core.planning.configuration import PlanConfig
 from tests.capsule_person import default_recipe, write_scene
 
 RECIPE = default_recipe()
@@ -38,3 +40,14 @@ def test_a_darker_or_brighter_frame_is_measured(clip, gain):
 def test_a_person_out_of_sight_is_unknown(clip):
     nobody = replace(clip, masks=clip.masks & False)
     assert np.isnan(brightness_shifts(nobody, RECIPE.meshes)).all()
+
+
+def test_held_out_frames_decide_nothing(clip):
+    held_out = np.zeros(len(clip.frames), bool)
+    held_out[1] = True
+    kept = replace(clip, held_out=held_out)
+    frames = np.array(clip.frames)
+    frames[1] = 255 - frames[1]
+    changed = replace(kept, frames=frames)
+    first, second = (decide_appearance(c, RECIPE.meshes, PlanConfig()) for c in (kept, changed))
+    assert first == second

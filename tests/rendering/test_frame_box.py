@@ -42,6 +42,13 @@ def test_one_box_for_the_clip_holds_the_boxes_of_all_frames():
     assert (common.upper[0] >= own.upper).all()
 
 
+def test_the_body_s_middle_is_its_own_also_where_one_box_holds_the_clip():
+    for row in range(3):
+        assert boxes("clip").middle(row) == pytest.approx(boxes().middle(row), abs=1e-5)
+        inside = meshes()[row].min(0) < boxes().middle(row)
+        assert (inside & (boxes().middle(row) < meshes()[row].max(0))).all()
+
+
 def test_the_ray_through_the_middle_enters_and_leaves_whichever_camera_looks():
     made = boxes()
     for eye in ([2.0, -3.0, 1.2], [-4.0, 1.0, 2.0], [0.0, 6.0, 0.9]):

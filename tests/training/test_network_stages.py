@@ -215,3 +215,12 @@ def test_a_body_that_stands_still_has_no_motion_to_fit(prepared, tmp_path):
     fit(prepared, tmp_path / "a", tmp_path / "b", SCHEDULE.model_copy(update={"fit_steps": 2}))
     moved = changed(weights(tmp_path / "a"), weights(tmp_path / "b"))
     assert not moved & {"canonical_motion", "observed_motion"}
+
+
+def test_a_scene_whose_density_died_says_so(prepared, fitted, tmp_path):
+    problem = network_problem(fitted, prepared.clip, Learned(), LOSSES, 0)
+    with torch.no_grad():
+        problem.field.coarse.density_head.bias.fill_(-1e3)
+    stage = SCHEDULE.joint().without_steps()
+    result = optimise_scene(prepared.clip, problem, stage, 0, Seconds(), tmp_path, silent)
+    assert any("coarse network has no density on 100 %" in words for words in result.warnings)
