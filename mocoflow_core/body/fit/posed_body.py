@@ -1,0 +1,175 @@
+"""The body in its poses, and how its points move with every unknown, exactly.
+
+Unknowns of a frame: the root joint's place (3), the root's rotation (3, about the camera's axes),
+then one angle for each axis of ``FREEDOM``. Unknowns shared by all frames: the shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from mocoflow_core.body.fit.fittable_body import FittableBody
+from mocoflow_core.body.fit.freedom import FREEDOM
+
+Array = NDArray[np.float64]
+
+ROOT = 6
+UNKNOWNS = ROOT + len(FREEDOM.joint)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPose:
+    """Camera axes (x right, y down, z forward), metres, radians."""
+
+    places: Array  # (T, 3) of the root joint
+    rotations: Array  # (T, 3, 3) rest pose -> camera
+    angles: Array  # (T, A) about ``FREEDOM``'s axes
+    shape: Array  # (C,)
+
+    def moved(self, step: Array, shape_step: Array) -> BodyPose:
+        """After a step (T, UNKNOWNS) of the frames' unknowns and (C,) of the shape."""
+        turn = Rotation.from_rotvec(step[:, 3:ROOT]).as_matrix()
+        return BodyPose(
+            self.places + step[:, :3],
+            turn @ self.rotations,
+            self.angles + step[:, ROOT:],
+            self.shape + shape_step,
+        )
+
+    def frames(self, rows: slice | NDArray[np.int64]) -> BodyPose:
+        """Only the given frames."""
+        return replace(
+            self,
+            places=self.places[rows],
+            rotations=self.rotations[rows],
+            angles=self.angles[rows],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class AttachedPoints:
+    """Points as mixtures of what the joints move: all that skinning needs to know of them.
+
+    Linear blend skinning moves a mixture of vertices like the sums of its weights, and of its
+    weighted rest places, over each joint. Leading axes are free.
+    """
+
+    mass: Array  # (..., N, J)
+    moment: Array  # (..., N, J, 3) metres
+    basis: Array  # (C, ..., N, J, 3) how the moment grows with the shape
+
+    @classmethod
+    def of(cls, body: FittableBody, mixture: Array, shape: Array) -> AttachedPoints:
+        """Mixtures (N, V) of vertices at a shape (C,)."""
+        count = body.weights.shape[1]
+        spread = (mixture[:, None, :] * body.weights.T).reshape(-1, mixture.shape[1])
+        size = (len(mixture), count)
+        moment = (spread @ body.rest_vertices(shape)).reshape(*size, 3)
+        basis = (spread @ body.vertex_basis).reshape(-1, *size, 3)
+        return cls(spread.sum(1).reshape(size), moment, basis)
+
+
+@dataclass(frozen=True, eq=False)
+class PosedBody:
+    """The joints of T frames; ``R x + b`` takes rest points of a part to the camera's axes."""
+
+    body: FittableBody
+    pose: BodyPose
+    turns: Array  # (T, J, 3, 3)
+    joints: Array  # (T, J, 3) where the joints are
+    axes: Array  # (T, 3 + A, 3) about which each rotation unknown turns, camera axes
+
+    @classmethod
+    def of(cls, body: FittableBody, pose: BodyPose) -> PosedBody:
+        heads, parents = body.rest_heads(pose.shape), body.parents
+        vectors = FREEDOM.rotation_vectors(pose.angles)
+        count = vectors.shape[:2]
+        local = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(*count, 3, 3)
+        turns, joints = np.empty((*count, 3, 3)), np.empty((*count, 3))
+        turns[:, 0], joints[:, 0] = pose.rotations, pose.places
+        for joint in range(1, count[1]):
+            above = parents[joint]
+            turns[:, joint] = turns[:, above] @ local[:, joint]
+            bone = heads[joint] - heads[above]
+            joints[:, joint] = joints[:, above] + turns[:, above] @ bone
+        # A small change of a rotation vector turns about J dv, in the parent's axes.
+        frames = turns[:, parents] @ _left_jacobians(vectors)
+        axes = (frames[:, FREEDOM.joint] @ FREEDOM.axis[:, :, None])[..., 0]
+        root = np.broadcast_to(np.eye(3), (count[0], 3, 3))
+        return cls(body, pose, turns, joints, np.concatenate([root, axes], axis=1))
+
+    @cached_property
+    def shifts(self) -> Array:
+        """(T, J, 3): ``b`` of each part."""
+        return self.joints - (self.turns @ self._heads[:, :, None])[..., 0]
+
+    @cached_property
+    def _heads(self) -> Array:
+        return self.body.rest_heads(self.pose.shape)
+
+    @cached_property
+    def shift_basis(self) -> Array:
+        """(T, J, C, 3): how the shifts grow with the shape."""
+        basis, parents = np.moveaxis(self.body.head_basis, 0, 1), self.body.parents
+        moved = np.zeros((*self.joints.shape[:2], basis.shape[1], 3))
+        for joint in range(1, len(parents)):
+            above = parents[joint]
+            bones = (basis[joint] - basis[above]) @ np.swapaxes(self.turns[:, above], 1, 2)
+            moved[:, joint] = moved[:, above] + bones
+        return moved - basis @ np.swapaxes(self.turns, 2, 3)
+
+    def vertices(self) -> Array:
+        """(T, V, 3)."""
+        rest, weights = self.body.rest_vertices(self.pose.shape), self.body.weights
+        transforms = np.concatenate([self.turns, self.shifts[..., None]], axis=-1)
+        blended = (weights @ transforms.reshape(*transforms.shape[:2], 12)).reshape(
+            len(transforms), -1, 3, 4
+        )
+        return (blended[..., :3] @ rest[:, :, None])[..., 0] + blended[..., 3]
+
+    def points(self, points: AttachedPoints) -> Array:
+        """Places (T, N, 3)."""
+        return self._parts(points).sum(2)
+
+    def _parts(self, points: AttachedPoints) -> Array:
+        """(T, N, J, 3): what each joint contributes."""
+        turned = (self.turns[:, None] @ points.moment[..., None])[..., 0]
+        return turned + points.mass[..., None] * self.shifts[:, None]
+
+    def derivatives(self, points: AttachedPoints) -> tuple[Array, Array, Array]:
+        """Places (T, N, 3), by the frame's unknowns (T, N, 3, UNKNOWNS), by shape (T, N, 3, C)."""
+        parts = self._parts(points)
+        by_frame = np.zeros((*parts.shape[:2], 3, UNKNOWNS))
+        # Everything below a joint turns about it.
+        below = np.swapaxes(parts, 2, 3) @ self.body.below
+        carried = points.mass @ self.body.below
+        joint = np.concatenate([np.zeros(3, np.int64), FREEDOM.joint])
+        arms = np.swapaxes(below - carried[..., None, :] * self.joints.swapaxes(1, 2)[:, None], 2, 3)
+        by_frame[..., :3] = carried[..., :1, None] * np.eye(3)
+        turned = np.cross(self.axes[:, None], arms[:, :, joint])
+        by_frame[..., 3:] = np.swapaxes(turned, 2, 3)
+        return parts.sum(2), by_frame, self._by_shape(points)
+
+    def _by_shape(self, points: AttachedPoints) -> Array:
+        moments = np.moveaxis(points.basis, 0, -2)  # (..., N, J, C, 3)
+        turned = moments @ np.swapaxes(self.turns, 2, 3)[:, None]
+        moved = turned + points.mass[..., None, None] * self.shift_basis[:, None]
+        return np.swapaxes(moved.sum(2), 2, 3)
+
+
+def _left_jacobians(vectors: Array) -> Array:
+    """(..., 3, 3) of rotation vectors: ``exp(v + dv) = exp(J dv) exp(v)``."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*vectors.shape, 3)
+    small = angle < 1e-4
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 0.5, (1 - np.cos(safe)) / safe**2)
+    second = np.where(small, 1 / 6, (safe - np.sin(safe)) / safe**3)
+    return np.eye(3) + first * cross + second * cross @ cross
