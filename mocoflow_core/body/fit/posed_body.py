@@ -1,13 +1,15 @@
 """The body in its poses, and how its points move with every unknown, exactly.
 
 Unknowns of a frame: the root joint's place (3), the root's rotation (3, about the camera's axes),
-then one angle for each axis of ``FREEDOM``. Unknowns shared by all frames: the shape.
+then one angle for each axis of ``FREEDOM``. Unknowns shared by all frames: the shape, and how far
+clothes stand off each part.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,8 @@ Array = NDArray[np.float64]
 
 ROOT = 6
 UNKNOWNS = ROOT + len(FREEDOM.joint)
+# The joint of each rotation unknown.
+_JOINT_OF = np.concatenate([np.zeros(3, np.int64), FREEDOM.joint])
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +34,17 @@ class BodyPose:
     rotations: Array  # (T, 3, 3) rest pose -> camera
     angles: Array  # (T, A) about ``FREEDOM``'s axes
     shape: Array  # (C,)
+    clothes: Array  # (J,)
 
-    def moved(self, step: Array, shape_step: Array) -> BodyPose:
-        """After a step (T, UNKNOWNS) of the frames' unknowns and (C,) of the shape."""
+    def moved(self, step: Array, shared: Array) -> BodyPose:
+        """After a step (T, UNKNOWNS) of the frames' unknowns and (C + J,) of the shared ones."""
         turn = Rotation.from_rotvec(step[:, 3:ROOT]).as_matrix()
         return BodyPose(
             self.places + step[:, :3],
             turn @ self.rotations,
             self.angles + step[:, ROOT:],
-            self.shape + shape_step,
+            self.shape + shared[: len(self.shape)],
+            self.clothes + shared[len(self.shape) :],
         )
 
     def frames(self, rows: slice | NDArray[np.int64]) -> BodyPose:
@@ -49,29 +55,6 @@ class BodyPose:
             rotations=self.rotations[rows],
             angles=self.angles[rows],
         )
-
-
-@dataclass(frozen=True, eq=False)
-class AttachedPoints:
-    """Points as mixtures of what the joints move: all that skinning needs to know of them.
-
-    Linear blend skinning moves a mixture of vertices like the sums of its weights, and of its
-    weighted rest places, over each joint. Leading axes are free.
-    """
-
-    mass: Array  # (..., N, J)
-    moment: Array  # (..., N, J, 3) metres
-    basis: Array  # (C, ..., N, J, 3) how the moment grows with the shape
-
-    @classmethod
-    def of(cls, body: FittableBody, mixture: Array, shape: Array) -> AttachedPoints:
-        """Mixtures (N, V) of vertices at a shape (C,)."""
-        count = body.weights.shape[1]
-        spread = (mixture[:, None, :] * body.weights.T).reshape(-1, mixture.shape[1])
-        size = (len(mixture), count)
-        moment = (spread @ body.rest_vertices(shape)).reshape(*size, 3)
-        basis = (spread @ body.vertex_basis).reshape(-1, *size, 3)
-        return cls(spread.sum(1).reshape(size), moment, basis)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,34 +115,101 @@ class PosedBody:
         )
         return (blended[..., :3] @ rest[:, :, None])[..., 0] + blended[..., 3]
 
-    def points(self, points: AttachedPoints) -> Array:
+    def points(self, points: RestPoints) -> Array:
         """Places (T, N, 3)."""
-        return self._parts(points).sum(2)
+        return points.parts(self).sum(2)
 
-    def _parts(self, points: AttachedPoints) -> Array:
-        """(T, N, J, 3): what each joint contributes."""
-        turned = (self.turns[:, None] @ points.moment[..., None])[..., 0]
-        return turned + points.mass[..., None] * self.shifts[:, None]
-
-    def derivatives(self, points: AttachedPoints) -> tuple[Array, Array, Array]:
+    def derivatives(self, points: RestPoints) -> tuple[Array, Array, Array]:
         """Places (T, N, 3), by the frame's unknowns (T, N, 3, UNKNOWNS), by shape (T, N, 3, C)."""
-        parts = self._parts(points)
+        parts = points.parts(self)
         by_frame = np.zeros((*parts.shape[:2], 3, UNKNOWNS))
         # Everything below a joint turns about it.
-        below = np.swapaxes(parts, 2, 3) @ self.body.below
+        below = np.swapaxes(np.swapaxes(parts, 2, 3) @ self.body.below, 2, 3)
         carried = points.mass @ self.body.below
-        joint = np.concatenate([np.zeros(3, np.int64), FREEDOM.joint])
-        arms = np.swapaxes(below - carried[..., None, :] * self.joints.swapaxes(1, 2)[:, None], 2, 3)
+        arms = below - carried[..., None] * self.joints[:, None]
         by_frame[..., :3] = carried[..., :1, None] * np.eye(3)
-        turned = np.cross(self.axes[:, None], arms[:, :, joint])
-        by_frame[..., 3:] = np.swapaxes(turned, 2, 3)
-        return parts.sum(2), by_frame, self._by_shape(points)
+        by_frame[..., 3:] = np.swapaxes(_cross(self.axes[:, None], arms[:, :, _JOINT_OF]), 2, 3)
+        return parts.sum(2), by_frame, points.by_shape(self)
 
-    def _by_shape(self, points: AttachedPoints) -> Array:
-        moments = np.moveaxis(points.basis, 0, -2)  # (..., N, J, C, 3)
-        turned = moments @ np.swapaxes(self.turns, 2, 3)[:, None]
-        moved = turned + points.mass[..., None, None] * self.shift_basis[:, None]
+
+class RestPoints(Protocol):
+    """Points that joints carry: N of each frame, or the same N in all."""
+
+    @property
+    def mass(self) -> Array:
+        """(..., N, J) share of each joint."""
+
+    def parts(self, posed: PosedBody) -> Array:
+        """(T, N, J, 3): what each joint contributes to the places."""
+
+    def by_shape(self, posed: PosedBody) -> Array:
+        """(T, N, 3, C): how the places move with the shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mixtures:
+    """Weighted sums of many vertices, such as keypoints.
+
+    Linear blend skinning moves them like the sums of their weights, and of their weighted rest
+    places, over each joint; nothing else of the mesh is needed.
+    """
+
+    mass: Array  # (N, J)
+    moment: Array  # (N, J, 3) metres
+    basis: Array  # (N, J, C, 3) how the moment grows with the shape
+
+    @classmethod
+    def of(cls, body: FittableBody, mixture: Array, shape: Array) -> Mixtures:
+        """Mixtures (N, V) of vertices at a shape (C,)."""
+        count = body.weights.shape[1]
+        spread = (mixture[:, None, :] * body.weights.T).reshape(-1, mixture.shape[1])
+        size = (len(mixture), count)
+        moment = (spread @ body.rest_vertices(shape)).reshape(*size, 3)
+        basis = np.moveaxis(spread @ body.vertex_basis, 0, 1)
+        return cls(spread.sum(1).reshape(size), moment, basis.reshape(*size, -1, 3))
+
+    def parts(self, posed: PosedBody) -> Array:
+        turned = (posed.turns[:, None] @ self.moment[..., None])[..., 0]
+        return turned + self.mass[..., None] * posed.shifts[:, None]
+
+    def by_shape(self, posed: PosedBody) -> Array:
+        turned = self.basis @ np.swapaxes(posed.turns, 2, 3)[:, None]
+        moved = turned + self.mass[..., None, None] * posed.shift_basis[:, None]
         return np.swapaxes(moved.sum(2), 2, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class SkinPoints:
+    """Points on the skin, others in each frame."""
+
+    mass: Array  # (T, N, J) skinning weights
+    rest: Array  # (T, N, 3)
+    basis: Array  # (T, N, C, 3)
+
+    @classmethod
+    def middles(cls, body: FittableBody, edges: NDArray[np.int64], shape: Array) -> SkinPoints:
+        """Middles of edges (T, N, 2), pairs of vertices."""
+        basis = np.moveaxis(body.vertex_basis, 0, 1)
+        rest = body.rest_vertices(shape)
+        mean = [a[edges[..., 0]] + a[edges[..., 1]] for a in (body.weights, rest, basis)]
+        return cls(*(0.5 * both for both in mean))
+
+    def parts(self, posed: PosedBody) -> Array:
+        turned = (posed.turns[:, None] @ self.rest[:, :, None, :, None])[..., 0]
+        return self.mass[..., None] * (turned + posed.shifts[:, None])
+
+    def by_shape(self, posed: PosedBody) -> Array:
+        frames, joints = posed.joints.shape[:2]
+        turns = (self.mass @ posed.turns.reshape(frames, joints, 9)).reshape(frames, -1, 3, 3)
+        shifts = self.mass @ posed.shift_basis.reshape(frames, joints, -1)
+        moved = self.basis @ np.swapaxes(turns, 2, 3)
+        return np.swapaxes(moved + shifts.reshape(moved.shape), 2, 3)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    # numpy.cross takes four times as long.
+    first, second = a[..., [1, 2, 0]], a[..., [2, 0, 1]]
+    return first * b[..., [2, 0, 1]] - second * b[..., [1, 2, 0]]
 
 
 def _left_jacobians(vectors: Array) -> Array:
