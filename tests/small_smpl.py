@@ -192,7 +192,10 @@ def _model(joints, parents, vertices, shapes) -> dict[str, np.ndarray]:
 
 @cache
 def _surface(vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """One closed surface with exactly so many vertices: cut from a grid, then edges split."""
+    """One closed surface with exactly so many vertices: cut from a grid, then edges split.
+
+    With fewer than about 600 the grid is too coarse for arms and the body falls apart.
+    """
     step = np.sqrt(3.0 / vertices)
     while True:
         points, faces = _cut(step)
@@ -266,8 +269,7 @@ def _weights(template, joints, parents) -> np.ndarray:
     # A vertex left of the middle plane has nothing to do with the right leg.
     other_side = np.sign(joints[:, 0]) * np.sign(template[:, :1]) < 0
     nearness[other_side & (np.abs(template[:, :1]) > 0.02)] = 0
-    fourth = np.sort(nearness, axis=1)[:, -4:-3]
-    nearness[nearness < fourth] = 0
+    np.put_along_axis(nearness, np.argsort(nearness, axis=1)[:, :-4], 0, axis=1)
     return nearness / nearness.sum(axis=1, keepdims=True)
 
 
