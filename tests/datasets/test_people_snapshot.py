@@ -15,8 +15,8 @@ from mocoflow_core.datasets.dataset_checks import check_dataset
 from mocoflow_core.datasets.people_snapshot import PeopleSnapshotConfig, read_people_snapshot
 from mocoflow_core.datasets.write_dataset import write_dataset
 from mocoflow_core.errors import InputError
-from tests.datasets.lossless_video import write_lossless
 from tests.datasets.snapshot_layout import turning, write_snapshot
+from tests.lossless_video import write_lossless
 from tests.small_smpl import write_smpl
 
 FRAMES, SIDE = 12, 96
