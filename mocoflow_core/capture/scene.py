@@ -82,9 +82,8 @@ class Scene:
 
     def training_description(self) -> dict[str, Any]:
         """What the training side knows of ``scene.json``: no other camera, no truth, no names."""
-        values = self.description.model_dump(
-            mode="json", include={"format", "version", "fps", "world", "train_camera", "meshes"}
-        )
+        known = {"format", "version", "fps", "working_fps", "world", "train_camera", "meshes"}
+        values = self.description.model_dump(mode="json", include=known)
         camera = self.description.cameras[self.train_camera]
         values |= {"train_camera": self.train_camera, "camera": camera.model_dump(mode="json")}
         # What was estimated for another camera is known to be so.

@@ -68,6 +68,8 @@ class DatasetTruth:
 class DatasetScene:
     """One recording of a data set, in the project's conventions.
 
+    The train camera has every frame from its first to its last, as held-out frames lie between
+    those that are learned from; ``working_fps`` thins them out. Other cameras may have gaps.
     ``remarks`` say everything that was assumed, chosen, skipped or missing, in words.
     """
 
@@ -81,3 +83,4 @@ class DatasetScene:
     license: str
     attribution: str
     remarks: tuple[str, ...] = ()
+    working_fps: float | None = None  # to learn from; by default the paper's 12
