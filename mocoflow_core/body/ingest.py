@@ -28,6 +28,7 @@ from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 
 FileCoordinates = Literal["world", "camera", "camera-root-centred"]
+FIRST_TRANSLATIONS = "first_translations.npy"
 
 # What numpy raises for files of all sorts; a TypeError where the file is a single array.
 _UNREADABLE = (ValueError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error)
@@ -39,16 +40,21 @@ class IngestedMeshes:
 
     ``coordinates`` "world": world metres. "camera-root-centred": the train camera's axes, the
     translation unknown in each frame. ``located`` false asks for a location search.
+    ``first_translations`` (T, 3), metres in the train camera's axes: about where root-centred
+    bodies stand, such as a weak perspective camera says; nan in frames without one.
     """
 
     meshes: MeshSequence
     coordinates: Literal["world", "camera-root-centred"]
     located: bool
     warnings: tuple[str, ...] = ()
+    first_translations: NDArray[np.float64] | None = None
 
     def save(self, folder: Path) -> None:
-        """Write ``meshes.npz`` and ``ingested.json`` into an existing folder."""
+        """Write ``meshes.npz``, ``ingested.json`` and what else there is into a folder."""
         self.meshes.save(folder / "meshes.npz")
+        if self.first_translations is not None:
+            np.save(folder / FIRST_TRANSLATIONS, self.first_translations)
         values = {
             "coordinates": self.coordinates,
             "located": self.located,
@@ -60,8 +66,14 @@ class IngestedMeshes:
     def load(cls, folder: Path) -> IngestedMeshes:
         """Inverse of ``save``."""
         values = json.loads((folder / "ingested.json").read_text())
-        meshes = MeshSequence.load(folder / "meshes.npz")
-        return cls(meshes, values["coordinates"], values["located"], tuple(values["warnings"]))
+        first = folder / FIRST_TRANSLATIONS
+        return cls(
+            MeshSequence.load(folder / "meshes.npz"),
+            values["coordinates"],
+            values["located"],
+            tuple(values["warnings"]),
+            np.load(first, allow_pickle=False) if first.exists() else None,
+        )
 
 
 def ingest_meshes(scene: Scene, meshes_override: Path | None = None) -> IngestedMeshes:

@@ -206,3 +206,12 @@ def test_ingested_meshes_survive_saving(folder, tmp_path):
         before.located,
         before.warnings,
     )
+
+
+def test_first_translations_survive_saving(folder, tmp_path):
+    first = np.arange(3.0 * len(MESHES.vertices)).reshape(-1, 3)
+    first[1] = np.nan
+    (tmp_path / "saved").mkdir()
+    replace(ingested(folder), first_translations=first).save(tmp_path / "saved")
+    loaded = IngestedMeshes.load(tmp_path / "saved")
+    assert np.array_equal(loaded.first_translations, first, equal_nan=True)
