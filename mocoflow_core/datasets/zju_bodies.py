@@ -1,20 +1,22 @@
-"""Bodies of ZJU-MoCap: vertices as stored, or posed from their parameters; one file per frame."""
+"""Bodies of ZJU-MoCap: which folder they come from, and where their faces do."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.smpl_file import read_smpl_model
+from mocoflow_core.datasets.body_model_file import WHERE_TO_GET_IT, find_body_model
 from mocoflow_core.datasets.dataset_scene import DatasetMeshes
-from mocoflow_core.datasets.zju_parameters import posed_bodies, stored_vertices
-from mocoflow_core.datasets.face_list import read_faces
+from mocoflow_core.datasets.zju_parameters import posed_bodies, read_parameters, stored_vertices
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.mesh_file import read_mesh
 
 BodyKind = Literal["new_vertices", "new_params", "vertices", "params"]
 BodyChoice = Literal["best", "new_vertices", "new_params", "vertices", "params", "none"]
@@ -34,6 +36,13 @@ class BodySource:
     body_model: Path | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Bodies:
+    vertices: NDArray[np.float32]  # (T, V, 3)
+    faces: NDArray[np.int32]  # (F, 3)
+    remark: str | None
+
+
 def read_bodies(
     folder: Path, numbers: NDArray[np.int32], source: BodySource
 ) -> tuple[DatasetMeshes | None, tuple[str, ...]]:
@@ -44,24 +53,20 @@ def read_bodies(
     if source.choice == "none":
         return None, ("the bodies of the data set are not read: give some with --meshes",)
     kind, files = _files(folder, numbers, source)
+    present = np.array(sorted(files), np.int32)
+    paths = [files[number] for number in present.tolist()]
+    stored = kind in ("new_vertices", "vertices")
+    bodies = _stored(kind, paths, source) if stored else _posed(kind, paths, source)
     remarks = [f"bodies are those of {kind}"]
     if kind in OLD:
         remarks.append(
             f"{kind} were made without the pose blend shapes of SMPL, unlike new_{kind}: "
             "bodies bend less well"
         )
-    present = np.array(sorted(files), np.int32)
     if missing := len(numbers) - len(present):
         remarks.append(f"{missing} of {len(numbers)} frames have no file in {kind}")
-    paths = [files[number] for number in present.tolist()]
-    if kind in ("vertices", "new_vertices"):
-        vertices = stored_vertices(paths)
-        faces, remark = read_faces(source.faces, source.body_model, "new_vertices or vertices")
-    else:
-        vertices, faces, remark = posed_bodies(paths, source.body_model, kind == "new_params")
-    remarks += [remark] if remark else []
-    _require_topology(vertices, faces)
-    sequence = MeshSequence(present, vertices, faces)
+    remarks += [bodies.remark] if bodies.remark else []
+    sequence = MeshSequence(present, bodies.vertices, bodies.faces)
     meshes = DatasetMeshes(sequence, "world", True, f"ZJU-MoCap {kind} (multi-view fit)")
     return meshes, tuple(remarks)
 
@@ -70,7 +75,9 @@ def _files(
     folder: Path, numbers: NDArray[np.int32], source: BodySource
 ) -> tuple[BodyKind, dict[int, Path]]:
     """The first kind that has a body for any of the frames, and its files by frame number."""
-    kinds: Sequence[BodyKind] = KINDS if source.choice == "best" else (source.choice,)  # type: ignore[assignment]
+    kinds: Sequence[BodyKind] = KINDS
+    if source.choice != "best":
+        kinds = (cast(BodyKind, source.choice),)
     for kind in kinds:
         paths = {
             number: folder / kind / f"{number + source.number_offset}.npy"
@@ -87,10 +94,37 @@ def _files(
     )
 
 
-def _require_topology(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> None:
+def _posed(kind: BodyKind, files: list[Path], source: BodySource) -> _Bodies:
+    file, doubt = find_body_model(source.body_model, "neutral", f"pose the {kind} of ZJU-MoCap")
+    model = read_smpl_model(file)
+    vertices = posed_bodies(model, read_parameters(files), kind == "new_params")
+    return _Bodies(vertices, np.asarray(model.faces, np.int32), doubt)
+
+
+def _stored(kind: BodyKind, files: list[Path], source: BodySource) -> _Bodies:
+    vertices = stored_vertices(files)
+    faces, described = _faces(kind, source)
     if faces.max() >= vertices.shape[1]:
         raise InputError(
             f"faces of a body with {vertices.shape[1]} vertices",
             f"a face that names vertex {faces.max()}",
-            "Give the faces of SMPL, with its 6890 vertices.",
+            "Give the faces of SMPL, which has 6890 vertices.",
         )
+    return _Bodies(vertices, faces, f"{kind} come without faces: taken from {described}")
+
+
+def _faces(kind: BodyKind, source: BodySource) -> tuple[NDArray[np.int32], str]:
+    """Triangles (F, 3) of SMPL; every gender's and version's are the same."""
+    if source.faces is not None:
+        return read_mesh(source.faces)[1], source.faces.name
+    if source.body_model is None:
+        raise InputError(
+            f"the faces of SMPL, which {kind} come without",
+            "none",
+            "Name any mesh of a SMPL body (.obj, .ply, .glb; such as consensus.obj of "
+            f"People-Snapshot) with the field faces, or give a body model. {WHERE_TO_GET_IT}",
+        )
+    file = source.body_model
+    if file.is_dir():
+        file, _ = find_body_model(file, "neutral", f"take the faces of {kind} from")
+    return np.asarray(read_smpl_model(file).faces, np.int32), file.name

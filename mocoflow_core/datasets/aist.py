@@ -1,0 +1,269 @@
+"""AIST Dance Video DB with the annotations of AIST++: one dancer, nine calibrated cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from mocoflow_core.capture.scene import UP_VECTORS
+from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.datasets.aist_bodies import Motion, posed_motion, read_motion_file
+from mocoflow_core.datasets.aist_cameras import read_cameras
+from mocoflow_core.datasets.aist_files import AistFiles, find_files
+from mocoflow_core.datasets.aist_keypoints import keypoint_truth
+from mocoflow_core.datasets.aist_names import BAD_VIEWS, read_ignore_list, require_annotated
+from mocoflow_core.datasets.aist_time import GRID_FPS, Rounding
+from mocoflow_core.datasets.aist_views import (
+    Background,
+    ViewChoice,
+    available_ticks,
+    open_view,
+    present_views,
+    train_view,
+)
+from mocoflow_core.datasets.camera_up import up_of_cameras
+from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
+from mocoflow_core.errors import InputError
+from mocoflow_core.geometry.camera import Camera
+
+Indices = NDArray[np.int32]
+EXPECTED_UP: Up = "+y"
+CENTIMETRE_M = 0.01
+LICENSE = (
+    "annotations CC BY 4.0 (Google LLC); videos under the terms of the AIST Dance Video Database: "
+    "academic use, not to be passed on"
+)
+ATTRIBUTION = (
+    "AIST Dance Video Database (Tsuchida et al., ISMIR 2019); AIST++ (Li et al., ICCV 2021)"
+)
+# Videos and annotations may differ by a frame without anything being wrong.
+FRAME_TOLERANCE = 1
+
+
+class AistConfig(ConfigurationPart):
+    """What is taken of an AIST sequence; the defaults are the protocol of MoCo-Flow sec. 4."""
+
+    sequence: str | None = Field(
+        None, description="Name of the sequence or of one of its videos; null: the only one."
+    )
+    videos: Path | None = Field(None, description="Folder of the videos; null: found.")
+    annotations: Path | None = Field(
+        None, description="Folder with cameras/, motions/, keypoints3d/ of AIST++; null: found."
+    )
+    train_camera: str = Field(
+        "c09", pattern=r"^c\d\d$", description="Camera to learn from; the paper: c09, also c01."
+    )
+    evaluation_cameras: tuple[str, ...] | None = Field(
+        None, description="Cameras to score against; null: all others."
+    )
+    left_out_views: tuple[str, ...] = Field(
+        BAD_VIEWS, description="Videos that are not used: those known to be wrong."
+    )
+    ignore_list: Literal["refuse", "warn"] = Field(
+        "refuse", description="What to do with sequences whose annotations are known to be wrong."
+    )
+    start: int = Field(0, ge=0, description="First frame, counted on the 60 Hz grid.")
+    length: int = Field(
+        500, ge=1, description="Frames of the 60 Hz grid; every fifth makes 100 at the paper's 12."
+    )
+    evaluation_every: int = Field(
+        5, ge=1, description="Every n-th frame of the other cameras is taken: the working ones."
+    )
+    working_fps: float = Field(12.0, gt=0, description="Rate to learn from; the paper's (sec. 4).")
+    rounding: Rounding = Field(
+        "down", description="How frames of videos not quite at 60 come onto the grid; AIST++: down."
+    )
+    scale: Literal["centimetres", "smpl"] = Field(
+        "centimetres",
+        description="What makes metres: true centimetres / 100, or the unit in which the body is "
+        "as large as SMPL (it differs per sequence).",
+    )
+    masks: Path | None = Field(
+        None, description="Folder with <video name>/000000.png; null: what differs from the plate."
+    )
+    background: Background = Field(
+        "plate", description="Around the person: the clip's median (no shadows), or as filmed."
+    )
+    plate_frames: int = Field(48, ge=1, description="Frames that make the median, over the clip.")
+    difference_threshold: int = Field(
+        30, ge=1, le=255, description="Difference to the plate that counts as the person, 1/255."
+    )
+    bodies: Literal["motion", "none"] = Field(
+        "motion", description="Bodies posed from AIST++'s motion, or none: give some with --meshes."
+    )
+    body_model: Path | None = Field(
+        None, description="Male SMPL model file, or the folder it is in."
+    )
+    up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
+
+
+def read_aist(source: Path, configuration: AistConfig | None = None) -> DatasetScene:
+    """One sequence as a scene; ``source`` is a folder of videos and annotations, or one video.
+
+    Frame numbers count the 60 Hz grid of the annotations. The videos are looked at for their
+    plates; frames are read when written.
+
+    Raises InputError for names, cameras, videos, motions or body models that are wrong or missing.
+    """
+    configuration = configuration or AistConfig()
+    files = find_files(
+        source, configuration.sequence, configuration.videos, configuration.annotations
+    )
+    require_annotated(files.name)
+    ignored = _ignored(files, configuration)
+    motion = read_motion_file(files.motion)
+    unit_m, unit_remark = _unit(motion, configuration)
+    calibrated = read_cameras(files.cameras, files.name.sequence, unit_m)
+    present, view_remarks = present_views(files, calibrated, configuration.left_out_views)
+    train = train_view(configuration.train_camera, present)
+    clip, clip_remarks = _clip(files, train, motion, configuration)
+    cameras, camera_remarks = _cameras(files, calibrated, present, train, clip, configuration)
+    meshes, body_remarks = _meshes(files, motion, clip, unit_m, configuration)
+    truth, truth_remarks = keypoint_truth(files.keypoints, clip, unit_m)
+    up, up_remarks = _up(calibrated, configuration)
+    remarks = (*ignored, unit_remark, *view_remarks, *clip_remarks, *camera_remarks)
+    return DatasetScene(
+        name=files.name.sequence,
+        fps=GRID_FPS,
+        up=up,
+        train_camera=train,
+        cameras=cameras,
+        meshes=meshes,
+        truth=truth,
+        license=LICENSE,
+        attribution=ATTRIBUTION,
+        remarks=(*remarks, *body_remarks, *truth_remarks, *up_remarks, *_floor(meshes, up)),
+        working_fps=configuration.working_fps,
+    )
+
+
+def _ignored(files: AistFiles, configuration: AistConfig) -> tuple[str, ...]:
+    """A remark for a sequence on the ignore list, or one that there is no list.
+
+    Raises InputError for a sequence on the list, unless it is wanted nevertheless.
+    """
+    if not files.ignore_list.is_file():
+        return (f"no {files.ignore_list.name}: whether the annotations are known to be wrong "
+                "is not known",)
+    sequence = files.name.sequence
+    if sequence not in read_ignore_list(files.ignore_list):
+        return ()
+    if configuration.ignore_list == "warn":
+        return (f"{sequence} is on {files.ignore_list.name}: its annotations are known to be wrong",)
+    raise InputError(
+        "a sequence whose annotations are right",
+        f"{sequence}, which is on {files.ignore_list.name}",
+        "Choose another, or set ignore_list to warn.",
+    )
+
+
+def _unit(motion: Motion | None, configuration: AistConfig) -> tuple[float, str]:
+    """Metres of a unit of the data set's world, and how that was chosen."""
+    if configuration.scale == "centimetres":
+        return CENTIMETRE_M, "the world's unit is a centimetre, as the cameras were calibrated"
+    if motion is None:
+        raise InputError(
+            "the motion of the sequence, whose scale makes metres",
+            "none",
+            "Add motions/, or set scale to centimetres.",
+        )
+    remark = (
+        f"the world is divided by the scaling {motion.scaling:.2f} of this sequence's body: "
+        "lengths are those of a body of SMPL's size"
+    )
+    return 1 / motion.scaling, remark
+
+
+def _clip(
+    files: AistFiles, train: str, motion: Motion | None, configuration: AistConfig
+) -> tuple[Indices, tuple[str, ...]]:
+    """The ticks to use: asked for, filmed by the train camera, and with a motion if there is one.
+
+    Raises InputError when there are none.
+    """
+    ticks, remarks = available_ticks(files.video(train), configuration.rounding)
+    filmed = len(ticks)
+    if motion is not None:
+        if abs(filmed - len(motion.poses)) > FRAME_TOLERANCE:
+            remarks += (f"{train} has {filmed} frames, the motion {len(motion.poses)}",)
+        ticks = ticks[: len(motion.poses)]
+    start, length = configuration.start, configuration.length
+    clip = ticks[(ticks >= start) & (ticks < start + length)]
+    if not len(clip):
+        raise InputError(
+            f"frames {start} to {start + length - 1}",
+            f"a recording of {len(ticks)} frames",
+            "Choose others with start and length.",
+        )
+    if len(clip) < length:
+        remarks += (f"the clip has {len(clip)} of {length} frames: the recording is shorter",)
+    return clip, remarks
+
+
+def _cameras(
+    files: AistFiles,
+    calibrated: dict[str, Camera],
+    present: list[str],
+    train: str,
+    clip: Indices,
+    configuration: AistConfig,
+) -> tuple[dict[str, DatasetCamera], tuple[str, ...]]:
+    """The train camera with the whole clip, the others with the frames that are learned from."""
+    wanted = configuration.evaluation_cameras
+    others = [name for name in present if name != train and (wanted is None or name in wanted)]
+    choice = ViewChoice(
+        configuration.rounding,
+        configuration.masks,
+        configuration.background,
+        configuration.plate_frames,
+        configuration.difference_threshold,
+    )
+    cameras = {}
+    remarks = [
+        "masks are the user's"
+        if configuration.masks
+        else "AIST comes without masks: the person is what differs from the clip's median, with "
+        "shadows that are darker than the threshold"
+    ]
+    for name in (train, *others):
+        ticks = clip if name == train else clip[:: configuration.evaluation_every]
+        cameras[name], said = open_view(files, calibrated[name], ticks, choice)
+        remarks += said
+    return cameras, tuple(remarks)
+
+
+def _meshes(
+    files: AistFiles,
+    motion: Motion | None,
+    clip: Indices,
+    unit_m: float,
+    configuration: AistConfig,
+) -> tuple[DatasetMeshes | None, tuple[str, ...]]:
+    if configuration.bodies == "none":
+        return None, ("the motion is not used: give bodies with --meshes",)
+    if motion is None:
+        raise InputError(
+            f"the motion motions/{files.motion.name}",
+            "none",
+            "Add it, or set bodies to none and give some with --meshes.",
+        )
+    return posed_motion(motion, clip, unit_m, configuration.body_model)
+
+
+def _up(calibrated: dict[str, Camera], configuration: AistConfig) -> tuple[Up, tuple[str, ...]]:
+    if configuration.up:
+        return configuration.up, (f"up is {configuration.up}, as asked for",)
+    up, remark = up_of_cameras(calibrated.values(), EXPECTED_UP)
+    return up, (remark,)
+
+
+def _floor(meshes: DatasetMeshes | None, up: Up) -> tuple[str, ...]:
+    """Where the floor is: the calibration leaves it anywhere; feet stand on it most of the time."""
+    if meshes is None:
+        return ()
+    lowest = (meshes.sequence.vertices @ UP_VECTORS[up]).min(axis=1)
+    return (f"the floor is at {np.median(lowest):.2f} m along {up}, by the lowest points of bodies",)
