@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.imported_scene import scene_folder
 from flows.stopping import read_target
 from flows.user_folders import cache_folder
 from mocoflow_core.capture.extract import select_training_frames
@@ -50,7 +51,8 @@ class Request(BaseModel):
 
     @cached_property
     def scene(self) -> Scene:
-        return open_scene(self.scene_path, self.configuration.capture.train_camera)
+        folder = scene_folder(self.scene_path, without_bodies=self.meshes is not None)
+        return open_scene(folder, self.configuration.capture.train_camera)
 
     @cached_property
     def configuration(self) -> Configuration:

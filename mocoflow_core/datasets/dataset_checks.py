@@ -22,19 +22,15 @@ from mocoflow_core.body.mesh_checks import (
     require_shapes,
 )
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.calibration import require_calibration
 from mocoflow_core.capture.checks import check_lens, check_share
 from mocoflow_core.capture.frame_selection import require_contiguous
 from mocoflow_core.capture.scene import UP_VECTORS
-from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene
+from mocoflow_core.datasets.sampled_masks import sample_masks
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
-# Frames that are looked at, spread over the clip, and how closely.
-SAMPLED_FRAMES = 9
-LONGER_SIDE_PX = 384
 # A body of the right person at the right place, in whatever pose, covers more of the mask.
 HOPELESS_OVERLAP = 0.1
 
@@ -115,8 +111,10 @@ def _require_size(picture: NDArray[np.generic], camera: Camera, what: str) -> No
 
 
 def _check_foreground(recorded: DatasetCamera, required: bool) -> DatasetFindings:
+    assert recorded.masks is not None
     name = recorded.camera.name
-    shares = [mask.mean() for mask in _sampled_masks(recorded, recorded.frames.indices)[1]]
+    sampled = sample_masks(recorded.camera, recorded.masks, recorded.frames.indices)
+    shares = [float(mask.mean()) for mask in sampled.masks]
     share = float(np.median(shares)) if shares else 0.0
     if required and not any(shares):
         raise InputError(
@@ -124,21 +122,6 @@ def _check_foreground(recorded: DatasetCamera, required: bool) -> DatasetFinding
         )
     warnings = tuple(f"{name}: {warning}" for warning in check_share(share))
     return DatasetFindings({f"foreground_share of {name}": share}, warnings)
-
-
-def _sampled_masks(
-    recorded: DatasetCamera, among: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Numbers (N,) and undistorted masks (N, H, W) of a few frames, at a small size."""
-    assert recorded.masks is not None
-    available = np.intersect1d(recorded.masks.indices, among)
-    rows = np.linspace(0, len(available) - 1, min(SAMPLED_FRAMES, len(available)))
-    chosen = available[rows.round().astype(int)]
-    view = WorkingView.of(recorded.camera, LONGER_SIDE_PX)
-    masks = np.empty((len(chosen), view.camera.height, view.camera.width), bool)
-    for row, (_, mask) in enumerate(recorded.masks.read(chosen.tolist())):
-        masks[row] = view.mask(mask.astype(np.uint8) * np.uint8(255))
-    return chosen, masks
 
 
 def _check_body(scene: DatasetScene) -> DatasetFindings:
@@ -175,12 +158,12 @@ def meshes_in_world(meshes: DatasetMeshes, train_camera: Camera) -> MeshSequence
 
 def _check_overlap(recorded: DatasetCamera, world: MeshSequence, required: bool) -> DatasetFindings:
     """Silhouettes against masks, the meshes moved by -1, 0 and +1 frame."""
+    assert recorded.masks is not None
     name = recorded.camera.name
-    numbers, masks = _sampled_masks(recorded, world.frame_indices)
-    if not len(numbers):
+    sampled = sample_masks(recorded.camera, recorded.masks, world.frame_indices)
+    if not len(sampled.numbers):
         return DatasetFindings()
-    camera = WorkingView.of(recorded.camera, LONGER_SIDE_PX).camera
-    means = {shift: _overlap_shifted(world, numbers + shift, masks, camera) for shift in SHIFTS}
+    means = {shift: sampled.overlap(world, shift) for shift in SHIFTS}
     if required and means[0] < HOPELESS_OVERLAP:
         raise InputError(
             f"the body's silhouettes must lie on the masks of {name}",
@@ -201,13 +184,3 @@ def _check_overlap(recorded: DatasetCamera, world: MeshSequence, required: bool)
         )
     measured = {f"overlap at {shift:+d} of {name}": mean for shift, mean in means.items()}
     return DatasetFindings(measured, tuple(warnings))
-
-
-def _overlap_shifted(
-    world: MeshSequence, numbers: NDArray[np.int32], masks: NDArray[np.bool_], camera: Camera
-) -> float:
-    present = np.isin(numbers, world.frame_indices)
-    if not present.any():
-        return 0.0
-    bodies = silhouettes(world.at(numbers[present]).vertices, world.faces, camera)
-    return float(overlap(bodies, masks[present]).mean())

@@ -1,0 +1,115 @@
+"""A data set's folder in place of a scene's: imported at first use, kept in the user's cache."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING
+
+import typer
+
+from flows.user_folders import body_models_folder, cache_folder
+from mocoflow_core.errors import InputError
+from mocoflow_core.io.content_key import digest_document
+from mocoflow_core.io.full_disk import full_disk_is_bad_input
+
+if TYPE_CHECKING:
+    from mocoflow_core.configuration import ConfigurationPart
+    from mocoflow_core.datasets.import_dataset import ImportedDataset
+    from mocoflow_core.datasets.kinds import DatasetKind
+
+
+@lru_cache(maxsize=64)
+def scene_folder(path: Path, without_bodies: bool) -> Path:
+    """The path itself, or the scene folder of the data set that lies there.
+
+    Args:
+        without_bodies: those of the data set are not needed.
+
+    The data set is read by its defaults and imported once for the same files (their names, sizes
+    and times), the same configuration and version. Raises InputError as the import does.
+    """
+    if path.suffix == ".json" or not path.is_dir() or (path / "scene.json").is_file():
+        return path
+    from mocoflow_core.datasets.detect import detect_kind
+
+    kind = detect_kind(path)
+    configuration = _defaults(kind, without_bodies)
+    folder = cache_folder() / "datasets" / f"{path.resolve().name}-{_key(path, configuration)}"
+    if folder.is_dir():
+        typer.echo(f"{path} is {kind.name}, imported before: {folder}", err=True)
+        return folder
+    typer.echo(f"{path} is {kind.name}: imported into {folder}", err=True)
+    try:
+        with full_disk_is_bad_input(f"The folder {folder.parent}"):
+            tell(_import(kind, path, configuration, folder))
+    except InputError as error:
+        choices = f"mocoflow import {kind.name} {path} --set FIELD=VALUE --out DIR"
+        action = f"{error.action} Every choice: {choices}."
+        raise InputError(error.required, error.got, action) from error
+    return folder
+
+
+def tell(imported: ImportedDataset) -> None:
+    """Print what was assumed and measured, and what is unusual, on stderr."""
+    for remark in imported.remarks:
+        typer.echo(f"  {remark}", err=True)
+    measured = ", ".join(f"{name} {value:.4g}" for name, value in imported.measured.items())
+    typer.echo(f"  measured: {measured}", err=True)
+    for warning in imported.warnings:
+        typer.echo(f"  warning: {warning}", err=True)
+
+
+def _defaults(kind: DatasetKind, without_bodies: bool) -> ConfigurationPart:
+    from mocoflow_core.datasets.import_dataset import configure
+
+    fields = kind.configuration.model_fields
+    if without_bodies and "bodies" in fields:
+        return configure(kind, ("bodies=none",), None)
+    models = body_models_folder()
+    takes_model = "body_model" in fields and models.is_dir()
+    return configure(kind, (), models if takes_model else None)
+
+
+def _import(
+    kind: DatasetKind, source: Path, configuration: ConfigurationPart, folder: Path
+) -> ImportedDataset:
+    """Two processes may import the same at once: the first to be done gives the folder."""
+    from mocoflow_core.datasets.import_dataset import import_dataset
+    from tasks.terminal_bar import terminal_bar
+
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    beside = Path(mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        with terminal_bar(f"import {source.name}") as progress:
+            imported = import_dataset(kind, source, configuration, beside / "scene", progress)
+        if not folder.is_dir():
+            (beside / "scene").rename(folder)
+    finally:
+        rmtree(beside, ignore_errors=True)
+    return imported
+
+
+def _key(source: Path, configuration: ConfigurationPart) -> str:
+    from mocoflow_core.datasets.import_dataset import ALGORITHM_VERSION
+
+    given = getattr(configuration, "body_model", None)
+    document = {
+        "version": ALGORITHM_VERSION,
+        "configuration": configuration.model_dump(mode="json"),
+        "files": _stamps(source),
+        "body_models": _stamps(given) if given else [],
+    }
+    return digest_document(document)[:12]
+
+
+def _stamps(folder: Path) -> list[list[object]]:
+    """Name, size and time of every file: gigabytes of pictures are not read for their digest."""
+    stamps: list[list[object]] = []
+    for file in sorted(folder.rglob("*")):
+        if file.is_file():
+            status = file.stat()
+            stamps.append([str(file.relative_to(folder)), status.st_size, status.st_mtime_ns])
+    return stamps
