@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from mocoflow_core.capture.scene import UP_VECTORS
-from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.aist_bodies import Motion, posed_motion, read_motion_file
 from mocoflow_core.datasets.aist_cameras import read_cameras
+from mocoflow_core.datasets.aist_configuration import AistConfig
 from mocoflow_core.datasets.aist_files import AistFiles, find_files
 from mocoflow_core.datasets.aist_keypoints import keypoint_truth
-from mocoflow_core.datasets.aist_names import BAD_VIEWS, read_ignore_list, require_annotated
-from mocoflow_core.datasets.aist_time import GRID_FPS, Rounding
+from mocoflow_core.datasets.aist_names import read_ignore_list, require_annotated
+from mocoflow_core.datasets.aist_time import GRID_FPS
 from mocoflow_core.datasets.aist_views import (
-    Background,
     ViewChoice,
     available_ticks,
     open_view,
@@ -44,64 +41,10 @@ ATTRIBUTION = (
 FRAME_TOLERANCE = 1
 
 
-class AistConfig(ConfigurationPart):
-    """What is taken of an AIST sequence; the defaults are the protocol of MoCo-Flow sec. 4."""
-
-    sequence: str | None = Field(
-        None, description="Name of the sequence or of one of its videos; null: the only one."
-    )
-    videos: Path | None = Field(None, description="Folder of the videos; null: found.")
-    annotations: Path | None = Field(
-        None, description="Folder with cameras/, motions/, keypoints3d/ of AIST++; null: found."
-    )
-    train_camera: str = Field(
-        "c09", pattern=r"^c\d\d$", description="Camera to learn from; the paper: c09, also c01."
-    )
-    evaluation_cameras: tuple[str, ...] | None = Field(
-        None, description="Cameras to score against; null: all others."
-    )
-    left_out_views: tuple[str, ...] = Field(
-        BAD_VIEWS, description="Videos that are not used: those known to be wrong."
-    )
-    ignore_list: Literal["refuse", "warn"] = Field(
-        "refuse", description="What to do with sequences whose annotations are known to be wrong."
-    )
-    start: int = Field(0, ge=0, description="First frame, counted on the 60 Hz grid.")
-    length: int = Field(
-        500, ge=1, description="Frames of the 60 Hz grid; every fifth makes 100 at the paper's 12."
-    )
-    evaluation_every: int = Field(
-        5, ge=1, description="Every n-th frame of the other cameras is taken: the working ones."
-    )
-    working_fps: float = Field(12.0, gt=0, description="Rate to learn from; the paper's (sec. 4).")
-    rounding: Rounding = Field(
-        "down", description="How frames of videos not quite at 60 come onto the grid; AIST++: down."
-    )
-    scale: Literal["centimetres", "smpl"] = Field(
-        "centimetres",
-        description="What makes metres: true centimetres / 100, or the unit in which the body is "
-        "as large as SMPL (it differs per sequence).",
-    )
-    masks: Path | None = Field(
-        None, description="Folder with <video name>/000000.png; null: what differs from the plate."
-    )
-    background: Background = Field(
-        "plate", description="Around the person: the clip's median (no shadows), or as filmed."
-    )
-    plate_frames: int = Field(48, ge=1, description="Frames that make the median, over the clip.")
-    difference_threshold: int = Field(
-        30, ge=1, le=255, description="Difference to the plate that counts as the person, 1/255."
-    )
-    bodies: Literal["motion", "none"] = Field(
-        "motion", description="Bodies posed from AIST++'s motion, or none: give some with --meshes."
-    )
-    body_model: Path | None = Field(
-        None, description="Male SMPL model file, or the folder it is in."
-    )
-    up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
-
-
-def read_aist(source: Path, configuration: AistConfig | None = None) -> DatasetScene:
+def read_aist(
+    source: Path,
+    configuration: AistConfig = AistConfig(),  # noqa: B008 - frozen.
+) -> DatasetScene:
     """One sequence as a scene; ``source`` is a folder of videos and annotations, or one video.
 
     Frame numbers count the 60 Hz grid of the annotations. The videos are looked at for their
@@ -109,7 +52,6 @@ def read_aist(source: Path, configuration: AistConfig | None = None) -> DatasetS
 
     Raises InputError for names, cameras, videos, motions or body models that are wrong or missing.
     """
-    configuration = configuration or AistConfig()
     files = find_files(
         source, configuration.sequence, configuration.videos, configuration.annotations
     )
@@ -137,7 +79,7 @@ def read_aist(source: Path, configuration: AistConfig | None = None) -> DatasetS
         license=LICENSE,
         attribution=ATTRIBUTION,
         remarks=(*remarks, *body_remarks, *truth_remarks, *up_remarks, *_floor(meshes, up)),
-        working_fps=configuration.working_fps,
+        working_fps=GRID_FPS / configuration.stride,
     )
 
 
@@ -147,13 +89,17 @@ def _ignored(files: AistFiles, configuration: AistConfig) -> tuple[str, ...]:
     Raises InputError for a sequence on the list, unless it is wanted nevertheless.
     """
     if not files.ignore_list.is_file():
-        return (f"no {files.ignore_list.name}: whether the annotations are known to be wrong "
-                "is not known",)
+        return (
+            f"no {files.ignore_list.name}: whether the annotations are known to be wrong "
+            "is not known",
+        )
     sequence = files.name.sequence
     if sequence not in read_ignore_list(files.ignore_list):
         return ()
     if configuration.ignore_list == "warn":
-        return (f"{sequence} is on {files.ignore_list.name}: its annotations are known to be wrong",)
+        return (
+            f"{sequence} is on {files.ignore_list.name}: its annotations are known to be wrong",
+        )
     raise InputError(
         "a sequence whose annotations are right",
         f"{sequence}, which is on {files.ignore_list.name}",
@@ -191,13 +137,13 @@ def _clip(
         if abs(filmed - len(motion.poses)) > FRAME_TOLERANCE:
             remarks += (f"{train} has {filmed} frames, the motion {len(motion.poses)}",)
         ticks = ticks[: len(motion.poses)]
-    start, length = configuration.start, configuration.length
+    start, length = configuration.first_frame, configuration.frames
     clip = ticks[(ticks >= start) & (ticks < start + length)]
     if not len(clip):
         raise InputError(
             f"frames {start} to {start + length - 1}",
             f"a recording of {len(ticks)} frames",
-            "Choose others with start and length.",
+            "Choose others with first_frame and frames.",
         )
     if len(clip) < length:
         remarks += (f"the clip has {len(clip)} of {length} frames: the recording is shorter",)
@@ -230,7 +176,7 @@ def _cameras(
         "shadows that are darker than the threshold"
     ]
     for name in (train, *others):
-        ticks = clip if name == train else clip[:: configuration.evaluation_every]
+        ticks = clip if name == train else clip[:: configuration.stride]
         cameras[name], said = open_view(files, calibrated[name], ticks, choice)
         remarks += said
     return cameras, tuple(remarks)
@@ -266,4 +212,6 @@ def _floor(meshes: DatasetMeshes | None, up: Up) -> tuple[str, ...]:
     if meshes is None:
         return ()
     lowest = (meshes.sequence.vertices @ UP_VECTORS[up]).min(axis=1)
-    return (f"the floor is at {np.median(lowest):.2f} m along {up}, by the lowest points of bodies",)
+    return (
+        f"the floor is at {np.median(lowest):.2f} m along {up}, by the lowest points of bodies",
+    )

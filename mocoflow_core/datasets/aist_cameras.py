@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +69,11 @@ def for_pictures(camera: Camera, width: int, height: int) -> Camera:
             f"{width} x {height}",
             "Its calibration does not belong to them; leave the view out with left_out_views.",
         )
-    return camera if (width, height) == (camera.width, camera.height) else camera.resized(width, height)
+    return (
+        camera
+        if (width, height) == (camera.width, camera.height)
+        else camera.resized(width, height)
+    )
 
 
 def _require(file: Path, what: str) -> Path:
@@ -80,24 +86,29 @@ def _require(file: Path, what: str) -> Path:
     return file
 
 
-def _listed(file: Path) -> list[Any]:
+def _listed(file: Path) -> list[object]:
     try:
         cameras = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"{file.name} must be JSON", str(error), "Unpack it again.") from error
     if not isinstance(cameras, list) or not cameras:
-        raise InputError(f"a list of cameras in {file.name}", f"{cameras!r:.40}", "Unpack it again.")
+        raise InputError(
+            f"a list of cameras in {file.name}", f"{cameras!r:.40}", "Unpack it again."
+        )
     return cameras
 
 
-def _camera(values: Any, file: str, unit_m: float) -> Camera:
+def _camera(listed: object, file: str, unit_m: float) -> Camera:
+    values = cast(dict[str, Sequence[float]], listed)
     try:
         name, (width, height) = str(values["name"]), values["size"]
+        if not re.fullmatch(r"c\d\d", name):
+            raise ValueError(name)
         parts = {key: _numbers(values[key], shape) for key, shape in _SHAPES.items()}
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"name, size, {', '.join(_SHAPES)} of each camera in {file}",
-            f"{values!r:.60}",
+            f"name (c01), size, {', '.join(_SHAPES)} of each camera in {file}",
+            f"{listed!r:.60}",
             "Unpack it again.",
         ) from error
     return Camera(

@@ -58,10 +58,28 @@ def find_files(
     return AistFiles(_name(sequence, videos), videos, annotations)
 
 
+def missing_parts(folder: Path) -> list[str]:
+    """What a folder lacks to hold AIST videos with their annotations, in words."""
+    parts = {
+        "videos (*.mp4, named as gBR_sBM_c01_d04_mBR0_ch01.mp4)": _videos_in(folder),
+        "the AIST++ annotations (cameras/mapping.txt)": _annotations_in(folder),
+    }
+    return [what for what, found in parts.items() if found is None]
+
+
+def _annotations_in(folder: Path) -> Path | None:
+    places = (folder / part for part in _ANNOTATION_FOLDERS)
+    return next((place for place in places if (place / "cameras/mapping.txt").is_file()), None)
+
+
+def _videos_in(folder: Path) -> Path | None:
+    return next((folder / part for part in _VIDEO_FOLDERS if any(_listed(folder / part))), None)
+
+
 def _with_annotations(near: list[Path]) -> Path:
-    for folder in (place / part for place in near for part in _ANNOTATION_FOLDERS):
-        if (folder / "cameras" / "mapping.txt").is_file():
-            return folder
+    for found in map(_annotations_in, near):
+        if found:
+            return found
     raise InputError(
         "the AIST++ annotations (a folder with cameras/mapping.txt)",
         f"none in or beside {near[0]}",
@@ -70,9 +88,8 @@ def _with_annotations(near: list[Path]) -> Path:
 
 
 def _with_videos(folder: Path) -> Path:
-    for place in (folder / part for part in _VIDEO_FOLDERS):
-        if any(_listed(place)):
-            return place
+    if found := _videos_in(folder):
+        return found
     raise InputError(
         f"AIST videos ({VIDEO_SUFFIX}) in one flat folder",
         f"none in {folder}",

@@ -58,9 +58,7 @@ def masks_in_folder(folder: Path, frames: GridFrames) -> ImageMasks:
     return ImageMasks(images, lambda path: read_mask(path) > 127)
 
 
-def clip_plate(
-    frames: FrameSource, masks: MaskSource | None, count: int, threshold: int
-) -> Image:
+def clip_plate(frames: FrameSource, masks: MaskSource | None, count: int, threshold: int) -> Image:
     """The median background (H, W, 3) over ``count`` frames, spread over the clip."""
     numbers = frames.indices if masks is None else masks.indices
     rows = np.linspace(0, len(numbers) - 1, min(count, len(numbers))).round().astype(int)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.capture.frame_source import FrameSource
 from mocoflow_core.datasets.aist_cameras import for_pictures
+from mocoflow_core.datasets.aist_configuration import Background
 from mocoflow_core.datasets.aist_files import AistFiles
 from mocoflow_core.datasets.aist_masks import DifferenceMasks, clip_plate, masks_in_folder
 from mocoflow_core.datasets.aist_names import NEVER_RELEASED
@@ -23,7 +23,6 @@ from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.video import describe_video, read_frames
 
 Indices = NDArray[np.int32]
-Background = Literal["plate", "kept"]
 # Rates within this of 60 drift by a frame now and then; others are no recording of AIST's.
 USUAL_RATE = 0.02
 

@@ -12,7 +12,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.datasets.zju_lookalikes import refuse_lookalike_content, refuse_lookalike_tree
+from mocoflow_core.datasets.zju_lookalikes import (
+    lookalike_tree,
+    refuse_lookalike_content,
+    refuse_lookalike_tree,
+)
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.untrusted import read_untrusted
 
@@ -54,7 +58,7 @@ def read_annotations(folder: Path, unit: LengthUnit = "millimetres") -> ZjuAnnot
     Raises InputError for a folder or file that only looks like ZJU-MoCap, for calibrations that
     are incomplete or in another unit, and for pictures outside the folder.
     """
-    file = next((folder / name for name in ANNOTATION_FILES if (folder / name).is_file()), None)
+    file = annotation_file(folder)
     if file is None:
         refuse_lookalike_tree(folder)
         raise InputError(
@@ -75,6 +79,19 @@ def read_annotations(folder: Path, unit: LengthUnit = "millimetres") -> ZjuAnnot
                 raise InputError("pictures of calibrated cameras", f"{path}", "Correct annots.npy.")
             pictures[name][frame_number(path)] = path
     return ZjuAnnotations(dict(zip(names, calibrations, strict=True)), pictures)
+
+
+def annotation_file(folder: Path) -> Path | None:
+    """The file that holds the annotations, if there is one."""
+    return next((folder / name for name in ANNOTATION_FILES if (folder / name).is_file()), None)
+
+
+def missing_parts(folder: Path) -> list[str]:
+    """What a folder lacks to be a subject of ZJU-MoCap, in words."""
+    if annotation_file(folder):
+        return []
+    what = lookalike_tree(folder)
+    return [f"annots.npy (it is {what})" if what else "annots.npy", "pictures in Camera_B1 ..."]
 
 
 def camera_name(path: PurePosixPath) -> str:
@@ -124,7 +141,9 @@ def _calibrations(cams: dict[str, Any], unit: LengthUnit) -> list[ZjuCalibration
             "Take the file as it was distributed.",
         )
     parts = {
-        key: [_numbers(value, shape, f"{key} of camera {row}") for row, value in enumerate(cams[key])]
+        key: [
+            _numbers(value, shape, f"{key} of camera {row}") for row, value in enumerate(cams[key])
+        ]
         for key, shape in _SHAPES.items()
     }
     scale = METRES_PER_UNIT[unit]

@@ -20,7 +20,7 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
 Indices = NDArray[np.int32]
-Background = Literal["white", "kept"]
+Background = Literal["white", "filmed"]
 # The paper's camera with ID 01, under both namings.
 FIRST_CAMERAS = ("Camera_B1", "Camera_1")
 

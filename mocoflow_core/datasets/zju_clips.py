@@ -73,7 +73,7 @@ def unbroken_clip(
         raise InputError(
             f"frames {wanted} with picture and mask in the train camera",
             f"pictures {there}, of which {len(masked)} have a mask",
-            "Choose others with start and length, or add the masks.",
+            "Choose others with first_frame and frames, or add the masks.",
         )
     runs = np.split(usable, np.flatnonzero(np.diff(usable) != 1) + 1)
     clip = max(runs, key=len)

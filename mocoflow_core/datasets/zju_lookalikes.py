@@ -11,21 +11,21 @@ CALIBRATION_KEYS = ("K", "D", "R", "T")
 _ORIGINAL = "Give a folder of the original release: annots.npy, Camera_B1 ... or Camera (1) ..."
 
 
+def lookalike_tree(folder: Path) -> str | None:
+    """What a folder without annots.npy is, where it is a known relative of ZJU-MoCap."""
+    if (folder / "annots_new.npy").is_file():
+        return "the refined release (annots_new.npy holds cameras without a picture list)"
+    if (folder / "mesh_infos.pkl").is_file():
+        return "HumanNeRF's derived files (cameras.pkl, mesh_infos.pkl: one camera, metres)"
+    if (folder / "intri.yml").is_file():
+        return "EasyMocap's calibration files (intri.yml and extri.yml, in metres)"
+    return None
+
+
 def refuse_lookalike_tree(folder: Path) -> None:
     """Raise InputError when a folder without annots.npy is a known relative of ZJU-MoCap."""
-    if (folder / "annots_new.npy").is_file():
-        raise _is("the refined release (annots_new.npy holds cameras without a picture list)")
-    if (folder / "mesh_infos.pkl").is_file() or (folder / "cameras.pkl").is_file():
-        raise _is("HumanNeRF's derived files (cameras.pkl, mesh_infos.pkl: one camera, metres)")
-    if (folder / "intri.yml").is_file():
-        raise _is("EasyMocap's calibration files (intri.yml and extri.yml, in metres)")
-    subjects = sorted(path.parent.name for path in folder.glob("*/annots.npy"))
-    if subjects:
-        raise InputError(
-            "the folder of one subject",
-            f"one that holds {', '.join(subjects)}",
-            f"Choose one, for example {folder / subjects[0]}.",
-        )
+    if what := lookalike_tree(folder):
+        raise _is(what)
 
 
 def refuse_lookalike_content(content: dict[str, Any], name: str) -> None:

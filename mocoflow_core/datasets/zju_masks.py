@@ -60,7 +60,7 @@ def find_masks(
     choice: MaskChoice,
     size: tuple[int, int],
 ) -> LabelMasks:
-    """The masks that mirror the given pictures' paths; where there is none the number is missing."""
+    """The masks that mirror the given pictures' paths; numbers without one are missing."""
     found = {}
     for number, picture in pictures.items():
         paths = [folder / where / picture.with_suffix(".png") for where in FOLDERS[choice]]

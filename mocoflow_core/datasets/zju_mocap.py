@@ -38,19 +38,21 @@ class ZjuMocapConfig(ConfigurationPart):
     evaluation_cameras: tuple[str, ...] | None = Field(
         None, description="Cameras to score against; null: all others."
     )
-    start: int | None = Field(
-        None, ge=0, description="First frame, by its number; null: the subject's usual clip."
+    first_frame: int | None = Field(
+        None, ge=0, description="Source number; null: that of the subject's usual clip."
     )
-    length: int | None = Field(
-        None, ge=1, description="Number of source frames; null: the subject's usual clip."
+    frames: int | None = Field(
+        None, ge=1, description="Source frames; null: those of the subject's usual clip."
     )
-    evaluation_every: int = Field(
-        2, ge=1, description="Every n-th frame of the other cameras is taken: the working ones."
+    stride: int = Field(
+        2,
+        ge=1,
+        description="Every n-th frame is learned from, and taken of the other cameras: 24 to 12 "
+        "per second in the paper.",
     )
     fps: float = Field(
-        24.0, gt=0, description="Rate the frames count as; every second makes the paper's 12."
+        24.0, gt=0, description="Rate that the source counts as; the true one is not known."
     )
-    working_fps: float = Field(12.0, gt=0, description="Rate to learn from; the paper's (sec. 4).")
     masks: MaskChoice = Field(
         "union", description="Folder of masks: mask, mask_cihp, or what either calls a person."
     )
@@ -63,12 +65,14 @@ class ZjuMocapConfig(ConfigurationPart):
     up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
 
 
-def read_zju_mocap(source: Path, configuration: ZjuMocapConfig | None = None) -> DatasetScene:
+def read_zju_mocap(
+    source: Path,
+    configuration: ZjuMocapConfig = ZjuMocapConfig(),  # noqa: B008 - frozen.
+) -> DatasetScene:
     """One subject's folder (``CoreView_377``) as a scene. Pictures are read when written.
 
     Raises InputError for another layout, and for missing calibrations, pictures, masks, bodies.
     """
-    configuration = configuration or ZjuMocapConfig()
     annotations = read_annotations(source, configuration.camera_unit)
     train = choose_camera(annotations, configuration.train_camera)
     subject = subject_of([source.resolve().name, *annotations.pictures[train].values()])
@@ -78,8 +82,8 @@ def read_zju_mocap(source: Path, configuration: ZjuMocapConfig | None = None) ->
     cameras, camera_remarks = _cameras(source, annotations, train, clip, configuration)
     up, up_remarks = _up(cameras, configuration)
     rate_remark = (
-        f"the true rate is not known: frames count as {configuration.fps:g} per second and are "
-        "thinned out by their numbers"
+        f"the true rate is not known: the source counts as {configuration.fps:g} per second, and "
+        f"every {configuration.stride}. frame is learned from"
     )
     return DatasetScene(
         name=f"zju-mocap-{subject}" if subject else source.resolve().name,
@@ -95,7 +99,7 @@ def read_zju_mocap(source: Path, configuration: ZjuMocapConfig | None = None) ->
             *(rate_remark, *clip_remarks, *body_remarks, *trim_remarks, *camera_remarks),
             *up_remarks,
         ),
-        working_fps=configuration.working_fps,
+        working_fps=configuration.fps / configuration.stride,
     )
 
 
@@ -106,7 +110,7 @@ def _clip(
     subject: str | None,
     configuration: ZjuMocapConfig,
 ) -> tuple[Indices, tuple[str, ...]]:
-    wanted = chosen_range(subject, configuration.start, configuration.length)
+    wanted = chosen_range(subject, configuration.first_frame, configuration.frames)
     pictures, masked = recorded_frames(folder, annotations, train, configuration.masks)
     clip, remarks = unbroken_clip(wanted, pictures, masked)
     return clip, (*remarks, *bad_masks(subject, clip))
@@ -148,7 +152,7 @@ def _cameras(
     )
     cameras, remarks = {}, []
     for name in (train, *others):
-        every = 1 if name == train else configuration.evaluation_every
+        every = 1 if name == train else configuration.stride
         camera, said = open_camera(
             folder,
             annotations,

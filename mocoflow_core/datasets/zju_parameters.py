@@ -37,10 +37,14 @@ def read_parameters(files: Sequence[Path]) -> ZjuParameters:
     columns = {"Rh": 3, "Th": 3, "poses": 3 * JOINTS}
     contents = [_parameters(file) for file in files]
     rows = {
-        key: np.stack([_row(content, key, file, count) for content, file in zip(contents, files, strict=True)])
+        key: np.stack(
+            [_row(content, key, file, count) for content, file in zip(contents, files, strict=True)]
+        )
         for key, count in columns.items()
     }
-    shapes = [_row(content, "shapes", file, None) for content, file in zip(contents, files, strict=True)]
+    shapes = [
+        _row(content, "shapes", file, None) for content, file in zip(contents, files, strict=True)
+    ]
     fewest = min(len(shape) for shape in shapes)
     return ZjuParameters(
         rows["Rh"],
