@@ -23,13 +23,12 @@ class Studio:
 
     meshes: MeshSequence
     cameras: dict[str, Camera]
-    plates: dict[str, np.ndarray]
-
-    def masks(self, name: str) -> np.ndarray:
-        return silhouettes(self.meshes.vertices, self.meshes.faces, self.cameras[name])
+    plates: dict[str, np.ndarray]  # (H, W, 3)
+    masks: dict[str, np.ndarray]  # (T, H, W)
 
     def frames(self, name: str) -> np.ndarray:
-        return np.where(self.masks(name)[..., None], CLOTHES, self.plates[name])
+        """(T, H, W, 3)."""
+        return np.where(self.masks[name][..., None], CLOTHES, self.plates[name])
 
 
 def studio(names, world, meshes=None, width=64, height=96, frames=6) -> Studio:
@@ -43,7 +42,10 @@ def studio(names, world, meshes=None, width=64, height=96, frames=6) -> Studio:
     meshes = meshes or walking(frames)
     meshes = replace(meshes, vertices=(meshes.vertices @ world.T).astype(np.float32))
     plates = {name: room(width, height, seed) for seed, name in enumerate(names)}
-    return Studio(meshes, cameras, plates)
+    masks = {
+        name: silhouettes(meshes.vertices, meshes.faces, camera) for name, camera in cameras.items()
+    }
+    return Studio(meshes, cameras, plates, masks)
 
 
 def bent(studio: Studio, distortion) -> Studio:

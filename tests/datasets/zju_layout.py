@@ -27,6 +27,11 @@ class ZjuLayout:
     body_number_offset: int = 0
 
 
+# At sizes this small, halved colour resolution would leave nothing to compare.
+_JPEG = [
+    *(cv2.IMWRITE_JPEG_QUALITY, 100),
+    *(cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444),
+]
 # 20 and 21 are absent in 313 and 315.
 NAMES_313 = tuple(f"Camera ({number})" for number in (*range(1, 20), 22, 23))
 NAMES_377 = tuple(f"Camera_B{number}" for number in range(1, 24))
@@ -40,7 +45,7 @@ def write_zju(folder: Path, studio: Studio, layout: ZjuLayout = ZjuLayout()) -> 
         for name in studio.cameras
     }
     for name in studio.cameras:
-        _write_pictures(folder, paths[name], studio.frames(name), studio.masks(name), layout)
+        _write_pictures(folder, paths[name], studio.frames(name), studio.masks[name], layout)
     for kind in layout.body_folders:
         (folder / kind).mkdir()
         for number, body in zip(numbers, studio.meshes.vertices, strict=True):
@@ -93,7 +98,7 @@ def _write_pictures(folder, paths, frames, masks, layout: ZjuLayout) -> None:
     for path, frame, mask in zip(paths, frames, masks, strict=True):
         file = folder / path
         file.parent.mkdir(parents=True, exist_ok=True)
-        cv2.imwrite(str(file), frame[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 98])
+        cv2.imwrite(str(file), frame[..., ::-1], _JPEG)
         for kind in layout.mask_folders:
             mask_file = folder / kind / path.with_suffix(".png")
             mask_file.parent.mkdir(parents=True, exist_ok=True)
