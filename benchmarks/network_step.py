@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from benchmarks.plain_networks import PlainBoxScene, plain_losses
-from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.body.signed_distance import signed_distance_lattice
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.extract import extract_clip

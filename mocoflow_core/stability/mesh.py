@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.body.ingest import IngestedMeshes, ingest_meshes
+from mocoflow_core.body.ingest import IngestedMeshes
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.body.mesh_checks import UNIT_SIZES_M
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.signed_distance import signed_distance_lattice

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rigid_controls import rigid_controls
 from mocoflow_core.body.silhouette import silhouette

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocoflow_core.body.ingest import IngestedMeshes, ingest_meshes
+from mocoflow_core.body.ingest import IngestedMeshes
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from mocoflow_core.body.ingest import ingest_meshes
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.body.repair import RepairConfig, RoundsConfig
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
