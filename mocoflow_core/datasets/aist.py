@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.capture.scene import UP_VECTORS
-from mocoflow_core.datasets.aist_bodies import Motion, posed_motion, read_motion_file
+from mocoflow_core.datasets.aist_bodies import posed_motion
 from mocoflow_core.datasets.aist_cameras import read_cameras
 from mocoflow_core.datasets.aist_configuration import AistConfig
 from mocoflow_core.datasets.aist_files import AistFiles, find_files
@@ -25,11 +25,11 @@ from mocoflow_core.datasets.aist_views import (
 from mocoflow_core.datasets.camera_up import up_of_cameras
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.aist_motion import METRES, Motion, read_motion
 from mocoflow_core.geometry.camera import Camera
 
 Indices = NDArray[np.int32]
 EXPECTED_UP: Up = "+y"
-CENTIMETRE_M = 0.01
 LICENSE = (
     "annotations CC BY 4.0 (Google LLC); videos under the terms of the AIST Dance Video Database: "
     "academic use, not to be passed on"
@@ -57,7 +57,7 @@ def read_aist(
     )
     require_annotated(files.name)
     ignored = _ignored(files, configuration)
-    motion = read_motion_file(files.motion)
+    motion = read_motion(files.motion) if files.motion.is_file() else None
     unit_m, unit_remark = _unit(motion, configuration)
     calibrated = read_cameras(files.cameras, files.name.sequence, unit_m)
     present, view_remarks = present_views(files, calibrated, configuration.left_out_views)
@@ -110,8 +110,8 @@ def _ignored(files: AistFiles, configuration: AistConfig) -> tuple[str, ...]:
 def _unit(motion: Motion | None, configuration: AistConfig) -> tuple[float, str]:
     """Metres of a unit of the data set's world, and how that was chosen."""
     if configuration.scale == "centimetres":
-        return CENTIMETRE_M, "the world's unit is a centimetre, as the cameras were calibrated"
-    if motion is None:
+        return METRES, "the world's unit is a centimetre, as the cameras were calibrated"
+    if motion is None or motion.scaling <= 0:
         raise InputError(
             "the motion of the sequence, whose scale makes metres",
             "none",
@@ -134,9 +134,9 @@ def _clip(
     ticks, remarks = available_ticks(files.video(train), configuration.rounding)
     filmed = len(ticks)
     if motion is not None:
-        if abs(filmed - len(motion.poses)) > FRAME_TOLERANCE:
-            remarks += (f"{train} has {filmed} frames, the motion {len(motion.poses)}",)
-        ticks = ticks[: len(motion.poses)]
+        if abs(filmed - len(motion)) > FRAME_TOLERANCE:
+            remarks += (f"{train} has {filmed} frames, the motion {len(motion)}",)
+        ticks = ticks[: len(motion)]
     start, length = configuration.first_frame, configuration.frames
     clip = ticks[(ticks >= start) & (ticks < start + length)]
     if not len(clip):

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from mocoflow_core.body.blend_skinning import posed_vertices
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.easymocap import turned_bodies
 from mocoflow_core.io.untrusted import read_npy
 
 Array = NDArray[np.float64]
@@ -57,21 +56,16 @@ def read_parameters(files: Sequence[Path]) -> ZjuParameters:
 def posed_bodies(
     model: SmplModel, parameters: ZjuParameters, pose_blend_shapes: bool
 ) -> NDArray[np.float32]:
-    """Vertices (T, V, 3) in world metres.
-
-    The model is posed without global rotation; the whole body then turns about the world's origin,
-    not about its pelvis (EasyMocap).
-    """
-    coefficients = min(parameters.shapes.shape[1], model.shape_directions.shape[-1])
-    bodies = posed_vertices(
+    """Vertices (T, V, 3) in world metres; coefficients the model has no directions for are left."""
+    bodies = turned_bodies(
         model,
         parameters.poses,
-        parameters.shapes[:, :coefficients],
-        pose_directions=pose_blend_shapes,
+        parameters.shapes[:, : model.shape_directions.shape[-1]],
+        parameters.rotations,
+        parameters.translations,
+        pose_blend_shapes,
     )
-    turns = Rotation.from_rotvec(parameters.rotations).as_matrix()
-    world = np.einsum("tij,tvj->tvi", turns, bodies) + parameters.translations[:, None]
-    return world.astype(np.float32)
+    return bodies.astype(np.float32)
 
 
 def stored_vertices(files: Sequence[Path]) -> NDArray[np.float32]:

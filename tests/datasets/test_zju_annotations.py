@@ -30,7 +30,10 @@ LAYOUT_313 = ZjuLayout(nested_lists=True, time_stamped=True, first_number=1)
 @pytest.fixture(scope="module")
 def rigs():
     """Both camera rigs, with three frames; no picture is written."""
-    return {names: studio(names, Z_DOWN, frames=3, width=16, height=16) for names in (NAMES_313, NAMES_377)}
+    return {
+        names: studio(names, Z_DOWN, frames=3, width=16, height=16)
+        for names in (NAMES_313, NAMES_377)
+    }
 
 
 def content(rig, layout=ZjuLayout()):

@@ -50,7 +50,11 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path):
 def folder(tmp_path):
     """Frame 0 has both masks, 1 only the parsing labels, 2 none."""
     other = np.roll(PERSON, 1, axis=0)
-    for kind, number, mask in (("mask", 0, PERSON), ("mask_cihp", 0, other), ("mask_cihp", 1, other)):
+    for kind, number, mask in (
+        ("mask", 0, PERSON),
+        ("mask_cihp", 0, other),
+        ("mask_cihp", 1, other),
+    ):
         (tmp_path / kind / "Camera_B1").mkdir(parents=True, exist_ok=True)
         Image.fromarray(mask).save(tmp_path / kind / "Camera_B1" / f"{number:06d}.png")
     return tmp_path
