@@ -30,12 +30,15 @@ class AistLayout:
     ignored: tuple[str, ...] = ()
 
 
+AS_RELEASED = AistLayout()
+
+
 def write_aist(
     folder: Path,
     studio: Studio,
     motion: dict | None,
     keypoints_cm: dict | None = None,
-    layout: AistLayout = AistLayout(),
+    layout: AistLayout = AS_RELEASED,
 ) -> Path:
     """``videos/`` flat, ``annotations/`` in its tree; the studio is in metres, y up."""
     (folder / "videos").mkdir(parents=True)

@@ -16,6 +16,7 @@ from mocoflow_core.datasets.zju_annotations import (
 from mocoflow_core.errors import InputError
 from tests.datasets.studio import Z_DOWN, studio
 from tests.datasets.zju_layout import (
+    AS_RELEASED,
     NAMES_313,
     NAMES_377,
     ZjuLayout,
@@ -36,7 +37,7 @@ def rigs():
     }
 
 
-def content(rig, layout=ZjuLayout()):
+def content(rig, layout=AS_RELEASED):
     numbers = rig.meshes.frame_indices + layout.first_number
     paths = {
         name: [picture_path(name, number, layout) for number in numbers.tolist()]

@@ -9,7 +9,7 @@ import pytest
 from mocoflow_core.datasets.zju_mocap import ZjuMocapConfig, read_zju_mocap
 from mocoflow_core.errors import InputError
 from tests.datasets.studio import Z_DOWN, bent, studio
-from tests.datasets.zju_layout import ZjuLayout, write_zju
+from tests.datasets.zju_layout import AS_RELEASED, ZjuLayout, write_zju
 
 NAMES = ("Camera_B1", "Camera_B2", "Camera_B7")
 DISTORTION = [-0.05, 0.02, 0.001, -0.002, 0.003]
@@ -35,7 +35,7 @@ def faces(tmp_path_factory, filmed):
 def read(tmp_path, filmed, faces):
     """Write a variant of the layout, change it, read it."""
 
-    def write_and_read(layout=ZjuLayout(), change=None, name="CoreView_377", **settings):
+    def write_and_read(layout=AS_RELEASED, change=None, name="CoreView_377", **settings):
         folder = write_zju(tmp_path / name, filmed, layout)
         if change:
             change(folder)

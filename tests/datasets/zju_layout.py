@@ -27,6 +27,7 @@ class ZjuLayout:
     body_number_offset: int = 0
 
 
+AS_RELEASED = ZjuLayout()
 # At sizes this small, halved colour resolution would leave nothing to compare.
 _JPEG = [
     *(cv2.IMWRITE_JPEG_QUALITY, 100),
@@ -37,7 +38,7 @@ NAMES_313 = tuple(f"Camera ({number})" for number in (*range(1, 20), 22, 23))
 NAMES_377 = tuple(f"Camera_B{number}" for number in range(1, 24))
 
 
-def write_zju(folder: Path, studio: Studio, layout: ZjuLayout = ZjuLayout()) -> Path:
+def write_zju(folder: Path, studio: Studio, layout: ZjuLayout = AS_RELEASED) -> Path:
     """Write a subject; the studio's cameras are named like the folders. Returns the folder."""
     numbers = studio.meshes.frame_indices + layout.first_number
     paths = {
