@@ -13,6 +13,7 @@ from mocoflow_core.datasets.aist_cameras import read_cameras
 from mocoflow_core.datasets.aist_configuration import AistConfig
 from mocoflow_core.datasets.aist_files import AistFiles, find_files
 from mocoflow_core.datasets.aist_keypoints import keypoint_truth
+from mocoflow_core.datasets.aist_masks import PlateChoice
 from mocoflow_core.datasets.aist_names import read_ignore_list, require_annotated
 from mocoflow_core.datasets.aist_time import GRID_FPS
 from mocoflow_core.datasets.aist_views import (
@@ -36,6 +37,10 @@ LICENSE = (
 )
 ATTRIBUTION = (
     "AIST Dance Video Database (Tsuchida et al., ISMIR 2019); AIST++ (Li et al., ICCV 2021)"
+)
+NO_MASKS = (
+    "AIST comes without masks: the person is what differs from the clip's median background, with "
+    "shadows darker than the threshold"
 )
 # Videos and annotations may differ by a frame without anything being wrong.
 FRAME_TOLERANCE = 1
@@ -63,8 +68,12 @@ def read_aist(
     present, view_remarks = present_views(files, calibrated, configuration.left_out_views)
     train = train_view(configuration.train_camera, present)
     clip, clip_remarks = _clip(files, train, motion, configuration)
-    cameras, camera_remarks = _cameras(files, calibrated, present, train, clip, configuration)
     meshes, body_remarks = _meshes(files, motion, clip, unit_m, configuration)
+    choice = _view_choice(meshes, configuration)
+    others = [name for name in present if name in (configuration.evaluation_cameras or present)]
+    cameras, camera_remarks = _cameras(
+        files, calibrated, [train, *others], clip, configuration.stride, choice
+    )
     truth, truth_remarks = keypoint_truth(files.keypoints, clip, unit_m)
     up, up_remarks = _up(calibrated, configuration)
     remarks = (*ignored, unit_remark, *view_remarks, *clip_remarks, *camera_remarks)
@@ -150,33 +159,29 @@ def _clip(
     return clip, remarks
 
 
-def _cameras(
-    files: AistFiles,
-    calibrated: dict[str, Camera],
-    present: list[str],
-    train: str,
-    clip: Indices,
-    configuration: AistConfig,
-) -> tuple[dict[str, DatasetCamera], tuple[str, ...]]:
-    """The train camera with the whole clip, the others with the frames that are learned from."""
-    wanted = configuration.evaluation_cameras
-    others = [name for name in present if name != train and (wanted is None or name in wanted)]
-    choice = ViewChoice(
+def _view_choice(meshes: DatasetMeshes | None, configuration: AistConfig) -> ViewChoice:
+    return ViewChoice(
         configuration.rounding,
         configuration.masks,
         configuration.background,
-        configuration.plate_frames,
-        configuration.difference_threshold,
+        PlateChoice(configuration.plate_frames, configuration.difference_threshold),
+        meshes.sequence if meshes else None,
     )
-    cameras = {}
-    remarks = [
-        "masks are the user's"
-        if configuration.masks
-        else "AIST comes without masks: the person is what differs from the clip's median, with "
-        "shadows that are darker than the threshold"
-    ]
-    for name in (train, *others):
-        ticks = clip if name == train else clip[:: configuration.stride]
+
+
+def _cameras(
+    files: AistFiles,
+    calibrated: dict[str, Camera],
+    names: list[str],
+    clip: Indices,
+    stride: int,
+    choice: ViewChoice,
+) -> tuple[dict[str, DatasetCamera], tuple[str, ...]]:
+    """The first, which trains, with the whole clip; the others with what is learned from."""
+    cameras: dict[str, DatasetCamera] = {}
+    remarks = ["masks are the user's" if choice.masks else NO_MASKS]
+    for name in dict.fromkeys(names):
+        ticks = clip[::stride] if cameras else clip
         cameras[name], said = open_view(files, calibrated[name], ticks, choice)
         remarks += said
     return cameras, tuple(remarks)

@@ -9,11 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.frame_source import FrameSource
 from mocoflow_core.datasets.aist_cameras import for_pictures
 from mocoflow_core.datasets.aist_configuration import Background
 from mocoflow_core.datasets.aist_files import AistFiles
-from mocoflow_core.datasets.aist_masks import DifferenceMasks, clip_plate, masks_in_folder
+from mocoflow_core.datasets.aist_masks import (
+    DifferenceMasks,
+    PlateChoice,
+    clip_plate,
+    masks_in_folder,
+)
 from mocoflow_core.datasets.aist_names import NEVER_RELEASED
 from mocoflow_core.datasets.aist_time import GRID_FPS, GridFrames, Rounding, ticks_of
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, MaskSource
@@ -34,8 +40,8 @@ class ViewChoice:
     rounding: Rounding
     masks: Path | None  # folder with <video name>/%06d.png
     background: Background
-    plate_frames: int
-    difference_threshold: int
+    plate: PlateChoice
+    bodies: MeshSequence | None  # world metres; where the person is, for the plate
 
 
 def present_views(
@@ -103,8 +109,8 @@ def open_view(
     masks: MaskSource | None = None
     if choice.masks:
         masks = masks_in_folder(choice.masks / video.stem, frames)
-    plate = clip_plate(frames, masks, choice.plate_frames, choice.difference_threshold)
-    masks = masks or DifferenceMasks(frames, plate, choice.difference_threshold)
+    plate = clip_plate(frames, fitted, masks, choice.bodies, choice.plate)
+    masks = masks or DifferenceMasks(frames, plate, choice.plate.threshold)
     shown: FrameSource = frames
     if choice.background == "plate":
         shown = FramesOnPlate(frames, masks, plate)

@@ -14,7 +14,8 @@ from tests.capsule_person import look_at, room, walking
 # From z up to the world of ZJU-MoCap (z down) and of AIST++ (y up), both right-handed.
 Z_DOWN = np.diag([1.0, -1.0, -1.0])
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-CLOTHES = np.uint8([230, 30, 40])
+# Light clothes in a dark grey room: videos keep half of the resolution of colours only.
+CLOTHES = np.uint8([230, 215, 200])
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,10 @@ def studio(names, world, meshes=None, width=64, height=96, frames=6) -> Studio:
         cameras[name] = replace(camera, R=camera.R @ world.T)
     meshes = meshes or walking(frames)
     meshes = replace(meshes, vertices=(meshes.vertices @ world.T).astype(np.float32))
-    plates = {name: room(width, height, seed) for seed, name in enumerate(names)}
+    plates = {
+        name: (room(width, height, seed)[..., :1] // 2).repeat(3, axis=-1)
+        for seed, name in enumerate(names)
+    }
     masks = {
         name: silhouettes(meshes.vertices, meshes.faces, camera) for name, camera in cameras.items()
     }
