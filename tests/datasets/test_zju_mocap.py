@@ -9,7 +9,7 @@ import pytest
 from mocoflow_core.datasets.zju_mocap import ZjuMocapConfig, read_zju_mocap
 from mocoflow_core.errors import InputError
 from tests.datasets.studio import Z_DOWN, bent, studio
-from tests.datasets.zju_layout import AS_RELEASED, ZjuLayout, write_zju
+from tests.datasets.zju_layout import AS_RELEASED, ZjuLayout, write_faces, write_zju
 
 NAMES = ("Camera_B1", "Camera_B2", "Camera_B7")
 DISTORTION = [-0.05, 0.02, 0.001, -0.002, 0.003]
@@ -22,13 +22,7 @@ def filmed():
 
 @pytest.fixture(scope="module")
 def faces(tmp_path_factory, filmed):
-    """The faces of the body as a mesh file; stored vertices come without."""
-    import trimesh
-
-    file = tmp_path_factory.mktemp("faces") / "body.obj"
-    mesh = trimesh.Trimesh(filmed.meshes.vertices[0], filmed.meshes.faces, process=False)
-    file.write_text(trimesh.exchange.obj.export_obj(mesh))
-    return file
+    return write_faces(tmp_path_factory.mktemp("faces") / "smpl.obj", filmed)
 
 
 @pytest.fixture

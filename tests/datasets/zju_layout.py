@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import cv2
 import numpy as np
+import trimesh
 
 from tests.datasets.studio import Studio
 
@@ -53,6 +54,13 @@ def write_zju(folder: Path, studio: Studio, layout: ZjuLayout = AS_RELEASED) -> 
             np.save(folder / kind / f"{number + layout.body_number_offset}.npy", body)
     write_annotations(folder, annotations(studio, paths, layout), layout.annotations)
     return folder
+
+
+def write_faces(file: Path, studio: Studio) -> Path:
+    """A mesh file with the faces of the body, which stored vertices come without."""
+    mesh = trimesh.Trimesh(studio.meshes.vertices[0], studio.meshes.faces, process=False)
+    file.write_text(trimesh.exchange.obj.export_obj(mesh))
+    return file
 
 
 def annotations(studio: Studio, paths: dict[str, list[PurePosixPath]], layout: ZjuLayout) -> dict:
