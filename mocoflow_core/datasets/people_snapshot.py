@@ -32,7 +32,7 @@ from mocoflow_core.io.video import DecodedVideo, decode_to_the_end
 
 Indices = NDArray[np.int32]
 CAMERA = "camera"
-NO_MOTION = 1e-4  # Of the camera against the world; the distributed ones have zeros.
+NO_MOTION = 1e-4  # Distributed cameras have zeros.
 LICENSE = "People-Snapshot: non-commercial research only, on request; no redistribution."
 ATTRIBUTION = (
     "People-Snapshot; T. Alldieck, M. Magnor, W. Xu, C. Theobalt, G. Pons-Moll: Video Based "
@@ -93,7 +93,7 @@ def read_people_snapshot(
     """
     subject = folder.resolve().name
     paths = files.find_paths(folder)
-    camera = files.read_camera(paths.camera, CAMERA)
+    camera, moved = _as_world(files.read_camera(paths.camera, CAMERA))
     video = decode_to_the_end(paths.video)
     _require_size(video.width, video.height, camera, paths.video.name)
     masks = Hdf5Masks(paths.masks)
@@ -101,8 +101,7 @@ def read_people_snapshot(
     tracked = files.read_tracked_body(paths.poses)
     usable, remarks = _usable(video, masks, len(tracked.pose), paths, configuration)
     numbers, origin = choose_clip(subject, configuration.first_frame, configuration.frames, usable)
-    remarks.append(origin)
-    remarks += _camera_remarks(camera)
+    remarks += [origin, *moved]
     shrunk: MaskSource = masks
     if configuration.mask_erosion_px > 1:
         shrunk = ErodedMasks(masks, configuration.mask_erosion_px)
@@ -173,12 +172,11 @@ def _usable(
     return usable, remarks
 
 
-def _camera_remarks(camera: Camera) -> list[str]:
-    """The camera is the world in this data set; another one is taken as it says."""
+def _as_world(camera: Camera) -> tuple[Camera, list[str]]:
+    """The camera as the world: poses stand in its axes, whatever the file says of it."""
     apart = max(float(np.abs(camera.R - np.eye(3)).max()), float(np.abs(camera.t).max()))
-    return (
-        [] if apart < NO_MOTION else ["the camera is not at the world's origin: taken as it says"]
-    )
+    remarks = [] if apart < NO_MOTION else ["camera_rt and camera_t are set to 0: poses have them"]
+    return replace(camera, R=np.eye(3), t=np.zeros(3)), remarks
 
 
 def _meshes(

@@ -31,14 +31,17 @@ class SnapshotBodies:
     offsets: Array | None  # (V, 3) metres
 
     def pose(self, rows: NDArray[np.int32]) -> MeshSequence:
-        """LBS(template + S(shape) + offsets, pose) + translation, world metres."""
+        """LBS(template + S(shape) + offsets, pose) + translation, the camera's axes and metres.
+
+        Offsets move no joints, as in the authors' model.
+        """
         rows = rows[(rows >= 0) & (rows < len(self.tracked.pose))]
         vertices = posed_vertices(
             self.model,
             self.tracked.pose[rows],
             self.shape,
             self.tracked.translation[rows],
-            np.zeros(3) if self.offsets is None else self.offsets,
+            self.offsets,
         )
         faces = np.asarray(self.model.faces, np.int32)
         return MeshSequence(rows, np.asarray(vertices, np.float32), faces)
