@@ -81,4 +81,5 @@ def read_labels(path: Path) -> Mask:
     except (OSError, ValueError, Image.DecompressionBombError) as error:
         name = f"{path.parent.name}/{path.name}"
         raise InputError("a mask that can be decoded", name, "Copy the file again.") from error
-    return labels.any(axis=-1) if labels.ndim == 3 else labels != 0
+    person: Mask = labels.reshape(*labels.shape[:2], -1).any(axis=-1)
+    return person

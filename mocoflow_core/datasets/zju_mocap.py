@@ -150,7 +150,8 @@ def _cameras(
         if wanted is None
         else [choose_camera(annotations, name) for name in wanted]
     )
-    cameras, remarks = {}, []
+    cameras: dict[str, DatasetCamera] = {}
+    remarks: list[str] = []
     for name in (train, *others):
         every = 1 if name == train else configuration.stride
         camera, said = open_camera(
