@@ -38,10 +38,12 @@ LICENSE = (
 ATTRIBUTION = (
     "AIST Dance Video Database (Tsuchida et al., ISMIR 2019); AIST++ (Li et al., ICCV 2021)"
 )
-NO_MASKS = (
-    "AIST comes without masks: the person is what differs from the clip's median background, with "
-    "shadows darker than the threshold"
+NO_MASKS = "AIST comes without masks: the person is what differs from the clip's median background"
+NEAR_BODIES = (
+    ", near the bodies of its motion, well inside them in any colour, and beside them without what "
+    "looks like a shadow"
 )
+WITH_SHADOWS = ", shadows with it"
 # Videos and annotations may differ by a frame without anything being wrong.
 FRAME_TOLERANCE = 1
 
@@ -179,7 +181,8 @@ def _cameras(
 ) -> tuple[dict[str, DatasetCamera], tuple[str, ...]]:
     """The first, which trains, with the whole clip; the others with what is learned from."""
     cameras: dict[str, DatasetCamera] = {}
-    remarks = ["masks are the user's" if choice.masks else NO_MASKS]
+    made = NO_MASKS + (NEAR_BODIES if choice.bodies else WITH_SHADOWS)
+    remarks = ["masks are the user's" if choice.masks else made]
     for name in dict.fromkeys(names):
         ticks = clip[::stride] if cameras else clip
         cameras[name], said = open_view(files, calibrated[name], ticks, choice)

@@ -1,4 +1,4 @@
-"""Masks of AIST videos, which come with none: the user's own, or the difference to the plate."""
+"""Masks and plates of AIST videos, which come with neither."""
 
 from __future__ import annotations
 
@@ -6,29 +6,24 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.body.silhouette import silhouettes
 from mocoflow_core.capture.background import (
     background_plate,
     masks_from_plate,
     plate_without_masks,
 )
 from mocoflow_core.capture.frame_source import FrameSource, Image, numbered_images, read_mask
+from mocoflow_core.capture.shadows import shadow
 from mocoflow_core.datasets.aist_time import GridFrames
+from mocoflow_core.datasets.body_regions import BodyRegion, BodyRegions
 from mocoflow_core.datasets.dataset_scene import Mask, MaskSource
 from mocoflow_core.datasets.mask_sources import ImageMasks
-from mocoflow_core.geometry.camera import Camera
 
 # Growth of what differs from the plate before the plate is taken from the rest, share of the
 # longer side.
 PLATE_MARGIN = 0.015
-# Silhouettes of bodies stand in for masks: at this size, grown for clothes and lens distortion.
-SILHOUETTE_SIDE_PX = 384
-BODY_MARGIN = 0.03
 
 
 @dataclass(frozen=True)
@@ -41,11 +36,16 @@ class PlateChoice:
 
 @dataclass(frozen=True, eq=False)
 class DifferenceMasks:
-    """The largest region of each frame that differs from the plate, shadows with it."""
+    """The largest region of each frame that differs from the plate.
+
+    Where bodies are known: only near them; what has the plate's colour with less light, a shadow,
+    only on them; and well inside them whatever the colour.
+    """
 
     frames: FrameSource
     plate: Image  # (H, W, 3)
     threshold: int  # 1/255
+    bodies: BodyRegions | None = None
 
     @property
     def indices(self) -> NDArray[np.int32]:
@@ -57,7 +57,30 @@ class DifferenceMasks:
 
     def read(self, wanted: Collection[int]) -> Iterator[tuple[int, Mask]]:
         for number, image in self.frames.read(wanted):
-            yield number, masks_from_plate(image[None], self.plate, self.threshold)[0]
+            if self.bodies is None or number not in self.bodies.numbers:
+                yield number, differs_from(self.plate, image, self.threshold)
+            else:
+                yield number, person_near(self.bodies.at(number), self.plate, image, self.threshold)
+
+
+def differs_from(plate: Image, image: Image, threshold: int) -> Mask:
+    """The largest region (H, W) of one frame that differs from the plate."""
+    mask: Mask = masks_from_plate(image[None], plate, threshold)[0]
+    return mask
+
+
+def person_near(body: BodyRegion, plate: Image, image: Image, threshold: int) -> Mask:
+    """The person (H, W) in one frame, looked for near a body alone."""
+    mask = np.zeros(body.near.shape, bool)
+    if not body.near.any():
+        return mask
+    rows, columns = (np.flatnonzero(body.near.any(axis=axis)) for axis in (1, 0))
+    part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    seen, empty = image[part], plate[part]
+    person = body.near[part] & ~shadow(seen, body.on[part], empty)
+    differs = differs_from(empty, np.where(person[..., None], seen, empty), threshold)
+    mask[part] = differs | body.inside[part]
+    return mask
 
 
 def masks_in_folder(folder: Path, frames: GridFrames) -> ImageMasks:
@@ -73,45 +96,27 @@ def masks_in_folder(folder: Path, frames: GridFrames) -> ImageMasks:
     return ImageMasks(images, lambda path: read_mask(path) > 127)
 
 
-def body_masks(
-    bodies: MeshSequence, camera: Camera, numbers: NDArray[np.int32]
-) -> NDArray[np.bool_]:
-    """Where bodies in world metres cover the picture (T, H, W): about, at a small size, grown.
-
-    Lens distortion is left to the growth.
-    """
-    scale = min(1.0, SILHOUETTE_SIDE_PX / max(camera.width, camera.height))
-    small = camera.resized(round(camera.width * scale), round(camera.height * scale))
-    covered = silhouettes(bodies.at(numbers).vertices, bodies.faces, small)
-    side = 2 * round(BODY_MARGIN * max(small.width, small.height)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    size = (camera.width, camera.height)
-    grown = (cv2.dilate(mask.astype(np.uint8), kernel) for mask in covered)
-    return np.stack([cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST) > 0 for mask in grown])
-
-
 def clip_plate(
-    frames: FrameSource,
-    camera: Camera,
-    masks: MaskSource | None,
-    bodies: MeshSequence | None,
-    choice: PlateChoice,
+    frames: FrameSource, masks: MaskSource | None, bodies: BodyRegions | None, choice: PlateChoice
 ) -> Image:
     """The median background (H, W, 3) over some frames, spread over the clip.
 
     Masks say where the person is; else bodies do, for who dances on the spot is part of a plain
     median; without either the person is what moves.
     """
-    known = frames.indices if masks is None else masks.indices
-    if masks is None and bodies is not None:
-        known = np.intersect1d(known, bodies.frame_indices)
+    known = frames.indices
+    if masks is not None:
+        known = masks.indices
+    elif bodies is not None:
+        known = np.intersect1d(known, bodies.numbers)
     rows = np.linspace(0, len(known) - 1, min(choice.frames, len(known))).round().astype(int)
-    chosen = known[rows]
-    pictures = np.stack([image for _, image in frames.read(chosen.tolist())])
+    chosen = known[rows].tolist()
+    pictures = np.stack([image for _, image in frames.read(chosen)])
     margin_px = round(PLATE_MARGIN * max(pictures.shape[1:3]))
     if masks is not None:
-        people = np.stack([mask for _, mask in masks.read(chosen.tolist())])
+        people = np.stack([mask for _, mask in masks.read(chosen)])
         return background_plate(pictures, people, margin_px)
     if bodies is not None:
-        return background_plate(pictures, body_masks(bodies, camera, chosen), 0)
+        people = np.stack([bodies.at(number).near for number in chosen])
+        return background_plate(pictures, people, margin_px=0)
     return plate_without_masks(pictures, choice.threshold, margin_px)

@@ -22,6 +22,7 @@ from mocoflow_core.datasets.aist_masks import (
 )
 from mocoflow_core.datasets.aist_names import NEVER_RELEASED
 from mocoflow_core.datasets.aist_time import GRID_FPS, GridFrames, Rounding, ticks_of
+from mocoflow_core.datasets.body_regions import BodyRegions
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, MaskSource
 from mocoflow_core.datasets.frames_on_plate import FramesOnPlate
 from mocoflow_core.errors import InputError
@@ -41,7 +42,7 @@ class ViewChoice:
     masks: Path | None  # folder with <video name>/%06d.png
     background: Background
     plate: PlateChoice
-    bodies: MeshSequence | None  # world metres; where the person is, for the plate
+    bodies: MeshSequence | None  # world metres; about where the person is
 
 
 def present_views(
@@ -109,8 +110,9 @@ def open_view(
     masks: MaskSource | None = None
     if choice.masks:
         masks = masks_in_folder(choice.masks / video.stem, frames)
-    plate = clip_plate(frames, fitted, masks, choice.bodies, choice.plate)
-    masks = masks or DifferenceMasks(frames, plate, choice.plate.threshold)
+    bodies = BodyRegions(choice.bodies, fitted) if choice.bodies else None
+    plate = clip_plate(frames, masks, bodies, choice.plate)
+    masks = masks or DifferenceMasks(frames, plate, choice.plate.threshold, bodies)
     shown: FrameSource = frames
     if choice.background == "plate":
         shown = FramesOnPlate(frames, masks, plate)

@@ -81,5 +81,4 @@ def read_labels(path: Path) -> Mask:
     except (OSError, ValueError, Image.DecompressionBombError) as error:
         name = f"{path.parent.name}/{path.name}"
         raise InputError("a mask that can be decoded", name, "Copy the file again.") from error
-    person: Mask = labels.reshape(*labels.shape[:2], -1).any(axis=-1)
-    return person
+    return np.asarray(labels.reshape(*labels.shape[:2], -1).any(axis=-1), bool)
