@@ -79,11 +79,11 @@ def unbroken_clip(
     clip = max(runs, key=len)
     if len(clip) == wanted.length:
         return clip, ()
-    unmasked = len(np.setdiff1d(wanted.among(pictures), masked))
-    remark = (
-        f"of the frames {wanted} the clip holds {clip[0]} to {clip[-1]}, the longest run in "
-        f"which the train camera has pictures and masks ({unmasked} pictures lack their mask)"
-    )
+    remark = f"of the frames {wanted} the clip holds {clip[0]} to {clip[-1]}"
+    if len(runs) > 1:
+        remark += ", the longest run in which the train camera has pictures and masks"
+    if unmasked := len(np.setdiff1d(wanted.among(pictures), masked)):
+        remark += f" ({unmasked} pictures lack their mask)"
     return clip, (remark,)
 
 

@@ -82,8 +82,8 @@ def read_zju_mocap(
     cameras, camera_remarks = _cameras(source, annotations, train, clip, configuration)
     up, up_remarks = _up(cameras, configuration)
     rate_remark = (
-        f"the true rate is not known: the source counts as {configuration.fps:g} per second, and "
-        f"every {configuration.stride}. frame is learned from"
+        f"the true rate is not known: the source counts as {configuration.fps:g} per second, "
+        f"one frame in {configuration.stride} is learned from"
     )
     return DatasetScene(
         name=f"zju-mocap-{subject}" if subject else source.resolve().name,
