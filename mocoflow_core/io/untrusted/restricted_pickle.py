@@ -60,9 +60,14 @@ class PickleMachine:
             if literal is not None:
                 self._stack.append(literal(self._stream))
             elif code == b".":
-                return self._stack.pop()
+                return self._result()
             else:
                 self._follow(code)
+
+    def _result(self) -> object:
+        if not self._stack:
+            raise damaged("a pickle without a result")
+        return self._stack.pop()
 
     def nested(self, stream: ByteStream, outside: Outside | None) -> object:
         """What a pickle within this one holds, under the same allowance."""

@@ -96,9 +96,8 @@ def test_what_is_no_plain_data_is_refused(tmp_path, secret, write):
     path = tmp_path / "file.hdf5"
     with h5py.File(path, "w") as file:
         write(file, secret)
-    with pytest.raises(InputError, match=r"file\.hdf5 must hold") as caught:
+    with pytest.raises(InputError, match=r"file\.hdf5 must hold .*'(a|b)"):
         read_hdf5(path)
-    assert "'a" in caught.value.got
 
 
 def test_shapes_and_rows_follow_no_links_either(tmp_path, secret):
