@@ -20,6 +20,8 @@ import torch
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.untrusted import Limits, read_untrusted
+from tests.io.untrusted.valid_files import SPARSE
+from tests.python2_pickle import Forged, python2_pickle
 
 MEGABYTE = 2**20
 # Small, so that the tests are cheap.
@@ -142,7 +144,37 @@ def test_archives_that_grow_without_end(refused):
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.npy", bytes(20 * MEGABYTE))
-    refused(file.getvalue(), "unpack to a sensible size|must fit into")
+    refused(file.getvalue(), "bytes that grow beyond")
+
+
+def test_what_lies_in_a_file_as_it_is_may_be_larger_than_what_is_made(tmp_path):
+    big = np.zeros(LIMITS.made_bytes // 8 + 1)
+    torch.save({"a": torch.from_numpy(big)}, tmp_path / "big.pt")
+    np.savez(tmp_path / "big.npz", a=big)
+    joblib.dump({"a": big}, tmp_path / "big.pkl")
+    for path in tmp_path.iterdir():
+        assert read_untrusted(path, LIMITS)["a"].nbytes > LIMITS.made_bytes
+
+
+def test_one_entry_of_an_archive_listed_under_many_names(refused):
+    array = io.BytesIO()
+    np.save(array, np.zeros(MEGABYTE // 8))
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("00.npy", array.getvalue())
+        for number in range(1, 40):
+            # The directory points to the first entry again, whose name is then wrong.
+            again = zipfile.ZipInfo(f"{number:02}.npy")
+            first = archive.infolist()[0]
+            again.CRC, again.file_size, again.compress_size = (
+                first.CRC,
+                first.file_size,
+                first.compress_size,
+            )
+            again.header_offset = 0
+            archive.filelist.append(again)
+            archive.NameToInfo[again.filename] = again
+    refused(file.getvalue())
 
 
 def test_many_members_that_grow_a_little(refused):
@@ -185,12 +217,12 @@ def test_tensors_beyond_or_far_larger_than_their_storage(refused, tmp_path):
 
 
 def test_sparse_matrices_that_would_be_vast(refused):
-    from tests.io.untrusted.valid_files import SPARSE
-    from tests.python2_pickle import Forged, python2_pickle
-
     state = SPARSE | {"_shape": (10**9, 3)}
     refused(python2_pickle(Forged("scipy.sparse.csc", "csc_matrix", state)), "must fit into")
     for fault in (
+        {"_shape": (2, 2)},
+        {"_shape": 3},
+        {"data": np.zeros(3, complex)},
         {"indices": np.array([0, 9, 0])},
         {"indptr": np.array([0, 3, 1, 3])},
         {"data": 1},
