@@ -38,9 +38,7 @@ def middle(camera: Camera) -> Array:
     return np.array([camera.width, camera.height]) / 2
 
 
-def weak_translations(
-    scale_px: Array, origin_px: Array, anchors: Array, camera: Camera
-) -> Array:
+def weak_translations(scale_px: Array, origin_px: Array, anchors: Array, camera: Camera) -> Array:
     """Translations (T, 3) metres that show bodies as a weak perspective camera does.
 
     Args:
@@ -100,12 +98,10 @@ def middles(vertices: NDArray[np.floating]) -> Array:
 
 def _points(pixels: Array, depths: Array, camera: Camera) -> Array:
     """Points (T, 3) in the camera's axes, seen at pixels (T, 2) of the picture as stored."""
-    ideal = pixels
     if not camera.is_pinhole:
-        ideal = cv2.undistortPoints(
-            pixels[:, None], camera.K, camera.distortion, P=camera.K
-        ).reshape(-1, 2)
-    rays = np.linalg.solve(camera.K, np.column_stack([ideal, np.ones(len(ideal))]).T).T
+        ideal = cv2.undistortPoints(pixels[:, None], camera.K, camera.distortion, P=camera.K)
+        pixels = np.asarray(ideal, np.float64).reshape(-1, 2)
+    rays = np.linalg.solve(camera.K, np.column_stack([pixels, np.ones(len(pixels))]).T).T
     return depths[:, None] * rays
 
 

@@ -39,7 +39,9 @@ def _require_read(chosen: EstimateConfig, kind: Kind) -> None:
     """Raise InputError for a setting that the kind would ignore."""
     default = EstimateConfig()
     for name in type(chosen).model_fields:
-        if name in _ALWAYS | READERS[kind].fields or getattr(chosen, name) == getattr(default, name):
+        if name in _ALWAYS | READERS[kind].fields or getattr(chosen, name) == getattr(
+            default, name
+        ):
             continue
         readers = [other.title for other in READERS.values() if name in other.fields]
         raise InputError(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
 
-Arrays = dict[str, NDArray[np.generic]]
+Arrays = Mapping[str, NDArray[np.generic]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +99,7 @@ def in_order(track: Track) -> Track:
     """The same track with rows ascending in time."""
     order = np.argsort(track.frame_indices, kind="stable")
     arrays = {name: rows[order] for name, rows in track.arrays.items()}
-    return Track(
-        track.person, track.frame_indices[order], arrays, track.constants, track.remarks
-    )
+    return Track(track.person, track.frame_indices[order], arrays, track.constants, track.remarks)
 
 
 def _listed(tracks: Sequence[Track]) -> str:
@@ -110,7 +108,7 @@ def _listed(tracks: Sequence[Track]) -> str:
     return ", ".join(f"person {track.person} ({len(track)} frames)" for track in tracks)
 
 
-def row_arrays(record: Mapping[object, object], count: int, but: str) -> Arrays:
+def row_arrays(record: Mapping[str, object], count: int, but: str) -> Arrays:
     """The arrays of a tool's record that have a row for each of ``count`` frames.
 
     ``but`` is the name of the frame numbers themselves. What a tool leaves None is left out.

@@ -72,9 +72,7 @@ def _tracks(stored: Stored) -> list[Track]:
     constants = _constants(read_stored(camera)) if camera in stored.files(".npy") else {}
     files = _track_files(stored)
     numbers = frame_numbers(file.name for file in files)
-    return [
-        _track(k, read_stored(file), constants) for k, file in zip(numbers, files, strict=True)
-    ]
+    return [_track(k, read_stored(file), constants) for k, file in zip(numbers, files, strict=True)]
 
 
 def _track(person: int | None, content: object, constants: Arrays) -> Track:

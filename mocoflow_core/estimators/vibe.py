@@ -11,7 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.estimators.bodies import Bodies, modelled, stored as own_bodies
+from mocoflow_core.estimators.bodies import Bodies, modelled
+from mocoflow_core.estimators.bodies import stored as own_bodies
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.known import Known
 from mocoflow_core.estimators.placement import (
@@ -35,7 +36,9 @@ SAME_WIDTH = 0.005
 def recognises(stored: Stored) -> bool:
     """Records with a weak perspective camera, pose as axis-angle."""
     people = people_of(stored.content)
-    return bool(people) and all(is_cropped(one) and not has_matrices(one) for one in people.values())
+    return bool(people) and all(
+        is_cropped(one) and not has_matrices(one) for one in people.values()
+    )
 
 
 def is_cropped(record: Mapping[str, object]) -> bool:
