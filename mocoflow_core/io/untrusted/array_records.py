@@ -107,7 +107,7 @@ class ArrayRecord(Record):
             raise damaged("an array without a type")
         order = "F" if fortran else "C"
         if dtype.dtype is None:
-            self.value = nested(content, integers(shape, 16), order)
+            self.value = nested(content, integers(shape, 16))
         else:
             self.value = array_of(latin1_bytes(content), dtype.dtype, shape, order)
         self._built = True
@@ -143,16 +143,18 @@ def shaped(array: NDArray[np.generic], shape: tuple[int, ...], order: str) -> ND
     return array.reshape(shape)
 
 
-def nested(content: object, shape: tuple[int, ...], order: str) -> object:
-    """The items of an object array as nested lists, or the one item of an array without axes."""
+def nested(content: object, shape: tuple[int, ...]) -> object:
+    """The items of an object array as nested lists, or the one item of an array without axes.
+
+    NumPy writes them in the order of C, whatever the order of the array.
+    """
     if not isinstance(content, list) or len(content) != math.prod(shape):
         raise damaged("an array of objects with a strange number of them")
     if not shape:
         return content[0]
     if len(shape) == 1:
         return list(content)
-    positions = shaped(np.arange(len(content)), shape, order)
-    return _picked(content, positions)
+    return _picked(content, np.arange(len(content)).reshape(shape))
 
 
 def _picked(content: list[object], positions: NDArray[np.generic]) -> list[object]:
