@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -27,7 +27,7 @@ class Known:
     """The train camera as the tool saw its pictures, and what the user has said and given."""
 
     camera: Camera
-    chosen: EstimateConfig = EstimateConfig()
+    chosen: EstimateConfig = field(default_factory=EstimateConfig)
     described: MeshesDescription | None = None  # of the scene's meshes
 
     @cached_property

@@ -71,6 +71,12 @@ def refocused(translations: Array, anchors: Array, made_for: ToolCamera, camera:
     return _points(pixels, points[:, 2] * _focal_px(camera) / focal_px, camera) - anchors
 
 
+def where_known(translations: Array) -> Array:
+    """Translations (T, 3) with nan where the tool's numbers put nobody before the camera."""
+    known = np.isfinite(translations).all(axis=1) & (translations[:, 2] > 0)
+    return np.where(known[:, None], translations, np.nan)
+
+
 def placed(
     tool: str, vertices: NDArray[np.float32], made_for: ToolCamera, camera: Camera
 ) -> tuple[NDArray[np.float32], tuple[str, ...]]:

@@ -26,6 +26,7 @@ from mocoflow_core.estimators.placement import (
     middles,
     refocused,
     weak_translations,
+    where_known,
 )
 from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
 from mocoflow_core.estimators.tracks import Track, choose_track
@@ -65,7 +66,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
         faces=found.faces,
         coordinates="camera-root-centred",
         located=False,
-        first_translations=place(track, anchors, known),
+        first_translations=where_known(place(track, anchors, known)),
         remarks=(*chosen, *found.remarks),
     )
 

@@ -20,9 +20,10 @@ from mocoflow_core.estimators.placement import (
     middle,
     middles,
     weak_translations,
+    where_known,
 )
 from mocoflow_core.estimators.stored import Stored, people_of
-from mocoflow_core.estimators.tracks import Track, choose_track, row_arrays
+from mocoflow_core.estimators.tracks import Track, choose_track, frames_of, row_arrays
 from mocoflow_core.geometry.camera import Camera
 
 Array = NDArray[np.float64]
@@ -72,13 +73,13 @@ def read_cropped(tool: str, factor: float, stored: Stored, known: Known) -> Body
         faces=bodies.faces,
         coordinates="camera-root-centred",
         located=False,
-        first_translations=translations,
+        first_translations=None if translations is None else where_known(translations),
         remarks=(*chosen, *bodies.remarks, *placed),
     )
 
 
 def _track(person: int, record: Mapping[str, object]) -> Track:
-    frames = np.asarray(record.get("frame_ids", ()), np.int32).ravel()
+    frames = frames_of(record, "frame_ids")
     return Track(person, frames, row_arrays(record, len(frames), "frame_ids"))
 
 

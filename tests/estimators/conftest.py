@@ -12,18 +12,20 @@ from mocoflow_core.estimators.read import read_estimate
 from tests.estimators.layouts import CAMERA, Person
 from tests.small_smpl import write_smpl, write_smplx
 
+VERTICES = 500
+
 
 @pytest.fixture(scope="session")
 def smpl_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("models") / "SMPL_NEUTRAL.pkl"
-    write_smpl(path)
+    write_smpl(path, VERTICES)
     return path
 
 
 @pytest.fixture(scope="session")
 def smplx_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("models") / "SMPLX_NEUTRAL.npz"
-    write_smplx(path)
+    write_smplx(path, VERTICES)
     return path
 
 

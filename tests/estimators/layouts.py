@@ -102,7 +102,7 @@ def vibe_record(person: Person, frames=None, factor: float = 1.1, betas=None) ->
     betas = person.shapes() if betas is None else betas
     side = np.full(len(person), 260.0)
     s = scale_px * 2 / (factor * side)
-    box_centre = origin_px + [4.0, 30.0]
+    box_centre = origin_px + np.array([4.0, 30.0])
     cam = np.column_stack([s, (origin_px - box_centre) / scale_px[:, None]]).astype(np.float32)
     sx, sy = s * side / CAMERA.width, s * side / CAMERA.height
     tx = (box_centre[:, 0] - 320) / 320 / sx + cam[:, 1]

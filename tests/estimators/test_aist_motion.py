@@ -1,4 +1,4 @@
-"""Motions of AIST++: both shapes of everything, centimetres, and a scale that takes the pelvis along."""
+"""Motions of AIST++: shapes of all sorts, centimetres, a scale that takes the pelvis along."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def test_gvhmr_needs_smplx_and_says_so(smplx, smpl_file, read, tmp_path):
     path = layouts.write_gvhmr(tmp_path / "hmr4d_results.pt", Person.of(smplx))
     with pytest.raises(InputError, match=r"SMPL-X.*smpl-x\.is\.tue\.mpg\.de.*--body-model"):
         read(path)
-    with pytest.raises(InputError, match="SMPL-X body model, which has 55 joints, got .* 24"):
+    with pytest.raises(InputError, match=r"SMPL-X body model, which has 55 joints, got .* 24"):
         read(path, body_model=smpl_file)
 
 
