@@ -14,11 +14,11 @@ from mocoflow_core.planning import plan as planning
 from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.decision import Decision
 from mocoflow_core.planning.inspection import Inspection
-from mocoflow_core.planning.preparation import decide_frames, decide_preparation
+from mocoflow_core.planning.preparation import decide_frames, decide_preparation, decide_shadows
 from mocoflow_core.planning.visibility import visibility_warnings
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # Brightness is compared between training frames alone.
+ALGORITHM_VERSION = 5  # Says whether shadows are removed.
 
 
 @stage(PlanArtifact, ALGORITHM_VERSION)
@@ -39,7 +39,8 @@ def plan_scene(
     meshes = MeshSequence.load(work.open(bodies) / "meshes.npz")
     seen = Clip.load(work.open(clip))
     frames = decide_frames(clip.summary["repeated"], clip.summary["frames"], plan)
-    preparation = (*decide_preparation(found, plan), frames, repair)
+    shadows = decide_shadows(clip.summary["shadowed"], clip.summary["behind_person"], plan)
+    preparation = (*decide_preparation(found, plan), frames, shadows, repair)
     decided = planning.plan_scene(seen, meshes, preparation, plan, representation)
     (work.folder / "plan.json").write_text(decided.model_dump_json(indent=1))
     return {
