@@ -55,7 +55,9 @@ def modelled(
     return Bodies(vertices.astype(np.float32), model.faces.astype(np.int32), remarks)
 
 
-def stored(tool: str, vertices: Array, pose: Array | None, betas: Array | None, known: Known) -> Bodies:
+def stored(
+    tool: str, vertices: Array, pose: Array | None, betas: Array | None, known: Known
+) -> Bodies:
     """A tool's own vertices; with a body model at hand, of one shape and where they stood.
 
     Raises InputError without faces.
@@ -89,9 +91,7 @@ def _difference_m(model: SmplModel, vertices: Array, pose: Array, betas: Array) 
     """Largest distance between a tool's bodies and the model's, each about its middle."""
     rows = np.linspace(0, len(vertices) - 1, min(COMPARED_FRAMES, len(vertices))).astype(int)
     ours = posed_vertices(model, pose[rows], betas[rows])
-    apart = (ours - middles(ours)[:, None]) - (
-        vertices[rows] - middles(vertices[rows])[:, None]
-    )
+    apart = (ours - middles(ours)[:, None]) - (vertices[rows] - middles(vertices[rows])[:, None])
     return float(np.linalg.norm(apart, axis=-1).max())
 
 

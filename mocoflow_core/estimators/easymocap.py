@@ -106,14 +106,18 @@ def _tracks(stored: Stored) -> list[Track]:
     for number, file in zip(frame_numbers(file.name for file in files), files, strict=True):
         content = read_stored(file)
         records = _records(content)
-        if not records and content != []:
+        if not records and not (isinstance(content, list) and not content):
             raise InputError(
                 f"files of EasyMocap with {', '.join(PARTS)}", f"{file.name}", "Remove other files."
             )
         for record in records:
-            person = record.get("id")
-            rows[None if person is None else int(np.ravel(person)[0])].append((number, record))  # type: ignore[arg-type]
+            rows[_id(record)].append((number, record))
     return [_track(person, found) for person, found in rows.items()]
+
+
+def _id(record: Mapping[str, object]) -> int | None:
+    given = record.get("id")
+    return None if given is None else int(np.asarray(given).ravel()[0])
 
 
 def _track(person: int | None, rows: list[tuple[int, Mapping[str, object]]]) -> Track:

@@ -39,9 +39,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
     model = known.require_model(TOOL, "SMPL-X")
     shape, remarks = shapes_of(track.rows("betas"), known)
     bodies = posed_vertices(model, _pose(track), shape, track.floats("transl", 3))
-    vertices, refocus = placed(
-        TOOL, bodies.astype(np.float32), _camera(track, known), known.camera
-    )
+    vertices, refocus = placed(TOOL, bodies.astype(np.float32), _camera(track, known), known.camera)
     return BodyEstimate(
         source=TOOL,
         frame_indices=track.frame_indices,

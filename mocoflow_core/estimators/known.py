@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.body.smpl_file import read_smpl_model
+from mocoflow_core.body.mesh_faces import read_faces
+from mocoflow_core.body.smpl_file import SMPL_URL, SMPLX_URL, WITHOUT_MODEL, read_smpl_model
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig
-from mocoflow_core.estimators.mesh_file import read_faces
 from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.io.untrusted import read_npz
 
 # What tools' bodies are made of: joints of the model, and where users get it.
-MODELS = {
-    "SMPL": (24, "smpl.is.tue.mpg.de or smplify.is.tue.mpg.de"),
-    "SMPL-X": (55, "smpl-x.is.tue.mpg.de"),
-}
-NEED_NO_MODEL = (
-    "Estimates that bring vertices (VIBE, WHAM, ROMP with its meshes) need faces alone: name a "
-    "mesh of the same topology with --set meshes.faces=FILE."
-)
+MODELS = {"SMPL": (24, SMPL_URL), "SMPL-X": (55, SMPLX_URL)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +27,7 @@ class Known:
     """The train camera as the tool saw its pictures, and what the user has said and given."""
 
     camera: Camera
-    chosen: EstimateConfig = EstimateConfig()
+    chosen: EstimateConfig = field(default_factory=EstimateConfig)
     described: MeshesDescription | None = None  # of the scene's meshes
 
     @cached_property
@@ -46,7 +41,7 @@ class Known:
         action = f"Give the {family} model file (.pkl or .npz, from {where}) with --body-model."
         if self.model is None:
             needed = f"{tool} stores pose and shape, which need the {family} body model"
-            raise InputError(needed, "none", f"{action} {NEED_NO_MODEL}")
+            raise InputError(needed, "none", f"{action} {WITHOUT_MODEL}")
         found = len(self.model.parents)
         if found != joints:
             raise InputError(
@@ -61,27 +56,29 @@ class Known:
 
         From the file named for it or the body model. Raises InputError where neither fits.
         """
-        found = self._given_faces()
-        if found is None:
-            where = MODELS["SMPL"][1]
-            raise InputError(
-                f"{tool} stores no faces; they come from a body model or from a mesh",
-                "none",
-                f"Give the SMPL model file (.pkl or .npz, from {where}) with --body-model, or any "
-                "mesh of this topology (OBJ, PLY, GLB, meshes.npz) with --set meshes.faces=FILE.",
-            )
-        faces, count = found
-        if count != vertices:
-            raise InputError(
-                f"the bodies of {tool} have {vertices} vertices; their faces must belong to as many",
-                f"faces for {count} vertices",
-                "Give the body model or the mesh that the estimate was made with.",
-            )
-        return faces
-
-    def _given_faces(self) -> tuple[NDArray[np.int32], int] | None:
         if self.chosen.faces:
-            return read_faces(self.chosen.faces)
-        if self.model is not None:
-            return self.model.faces.astype(np.int32), len(self.model.template)
-        return None
+            return _faces_of(self.chosen.faces, vertices)
+        if self.chosen.body_model:
+            return read_faces(self.chosen.body_model, vertices)
+        raise InputError(
+            f"{tool} stores no faces; they come from a body model or from a mesh",
+            "none",
+            f"Give the SMPL model file (.pkl or .npz, from {SMPL_URL}) with --body-model, or any "
+            "mesh of this topology (OBJ, PLY, GLB, meshes.npz) with --set meshes.faces=FILE.",
+        )
+
+
+def _faces_of(path: Path, vertices: int) -> NDArray[np.int32]:
+    """Faces of a mesh, a body model, or a mesh file of our own."""
+    if path.suffix == ".npz":
+        arrays = read_npz(path)
+        bodies, faces = arrays.get("vertices"), arrays.get("faces")
+        if isinstance(bodies, np.ndarray) and isinstance(faces, np.ndarray):
+            if bodies.ndim == 3 and bodies.shape[1] == vertices:
+                return faces.astype(np.int32)
+            raise InputError(
+                f"{path} must hold bodies of {vertices} vertices",
+                f"{bodies.shape}",
+                "Give meshes of the same kind as the estimate's bodies.",
+            )
+    return read_faces(path, vertices)

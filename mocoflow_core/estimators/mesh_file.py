@@ -10,7 +10,6 @@ import trimesh
 from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.untrusted import read_npz
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb")
 
@@ -37,9 +36,10 @@ def read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
             file_type=kind[1:],
             resolver=None,
             process=False,
-            **({"maintain_order": True} if kind == ".obj" else {}),
+            maintain_order=True,
         )
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        assert isinstance(mesh, trimesh.Trimesh)
         vertices = np.asarray(mesh.vertices, np.float64)
         faces = np.asarray(mesh.faces, np.int32)
     # trimesh raises whatever its parsers meet.
@@ -50,22 +50,6 @@ def read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     if not len(faces) or vertices.ndim != 2:
         raise InputError(f"a mesh with faces in {path.name}", "none", "Export the mesh again.")
     return vertices, faces
-
-
-def read_faces(path: Path) -> tuple[NDArray[np.int32], int]:
-    """Faces (F, 3) of a mesh file or of a native ``.npz``, and how many vertices they belong to.
-
-    Raises InputError for a file without them.
-    """
-    if path.suffix.lower() in MESH_SUFFIXES:
-        vertices, faces = read_mesh(path)
-        return faces, len(vertices)
-    arrays = read_npz(path)
-    if not {"faces", "vertices"} <= set(arrays) or arrays["vertices"].ndim < 2:
-        raise InputError(
-            f"faces and vertices in {path.name}", ", ".join(sorted(arrays)), "Name another file."
-        )
-    return arrays["faces"].astype(np.int32), arrays["vertices"].shape[-2]
 
 
 def _bare_obj(content: bytes) -> bytes:

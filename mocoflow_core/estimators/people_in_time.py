@@ -35,9 +35,7 @@ def follow_people(places: Mapping[int, Array]) -> dict[int, NDArray[np.int64]]:
             steps = np.linalg.norm(here[:, None] - before[None], axis=-1)
             waited = np.array([frame - last[person][0] for person in alive])
             allowed = LARGEST_STEP * waited.clip(1)
-            for row, column in zip(
-                *linear_sum_assignment(np.minimum(steps, allowed)), strict=True
-            ):
+            for row, column in zip(*linear_sum_assignment(np.minimum(steps, allowed)), strict=True):
                 if steps[row, column] < allowed[column]:
                     who[row] = alive[column]
         for row in np.flatnonzero(who < 0):

@@ -18,7 +18,7 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.bodies import modelled
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.placement import ToolCamera, middles, refocused
+from mocoflow_core.estimators.placement import ToolCamera, middles, refocused, where_known
 from mocoflow_core.estimators.stored import Stored, frame_numbers
 from mocoflow_core.estimators.tracks import Track, choose_track
 
@@ -59,7 +59,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
         faces=bodies.faces,
         coordinates="camera-root-centred",
         located=False,
-        first_translations=translations,
+        first_translations=where_known(translations),
         remarks=(*chosen, *left_out, *bodies.remarks),
     )
 

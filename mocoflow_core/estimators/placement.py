@@ -38,9 +38,7 @@ def middle(camera: Camera) -> Array:
     return np.array([camera.width, camera.height]) / 2
 
 
-def weak_translations(
-    scale_px: Array, origin_px: Array, anchors: Array, camera: Camera
-) -> Array:
+def weak_translations(scale_px: Array, origin_px: Array, anchors: Array, camera: Camera) -> Array:
     """Translations (T, 3) metres that show bodies as a weak perspective camera does.
 
     Args:
@@ -73,6 +71,12 @@ def refocused(translations: Array, anchors: Array, made_for: ToolCamera, camera:
     return _points(pixels, points[:, 2] * _focal_px(camera) / focal_px, camera) - anchors
 
 
+def where_known(translations: Array) -> Array:
+    """Translations (T, 3) with nan where the tool's numbers put nobody before the camera."""
+    known = np.isfinite(translations).all(axis=1) & (translations[:, 2] > 0)
+    return np.where(known[:, None], translations, np.nan)
+
+
 def placed(
     tool: str, vertices: NDArray[np.float32], made_for: ToolCamera, camera: Camera
 ) -> tuple[NDArray[np.float32], tuple[str, ...]]:
@@ -100,12 +104,10 @@ def middles(vertices: NDArray[np.floating]) -> Array:
 
 def _points(pixels: Array, depths: Array, camera: Camera) -> Array:
     """Points (T, 3) in the camera's axes, seen at pixels (T, 2) of the picture as stored."""
-    ideal = pixels
     if not camera.is_pinhole:
-        ideal = cv2.undistortPoints(
-            pixels[:, None], camera.K, camera.distortion, P=camera.K
-        ).reshape(-1, 2)
-    rays = np.linalg.solve(camera.K, np.column_stack([ideal, np.ones(len(ideal))]).T).T
+        ideal = cv2.undistortPoints(pixels[:, None], camera.K, camera.distortion, P=camera.K)
+        pixels = np.asarray(ideal, np.float64).reshape(-1, 2)
+    rays = np.linalg.solve(camera.K, np.column_stack([pixels, np.ones(len(pixels))]).T).T
     return depths[:, None] * rays
 
 

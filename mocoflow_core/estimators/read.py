@@ -28,7 +28,18 @@ def read_estimate(path: Path, known: Known) -> BodyEstimate:
     stored = Stored(path)
     kind = detect(stored) if known.chosen.kind == "auto" else known.chosen.kind
     _require_read(known.chosen, kind)
-    estimate = READERS[kind].read(stored, known)
+    try:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            estimate = READERS[kind].read(stored, known)
+    except InputError:
+        raise
+    # Whatever arrays of another size, type or nesting than the tool's lead to.
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"an estimate as {READERS[kind].title} writes it",
+            f"other arrays in {path.name} ({type(error).__name__}: {str(error).splitlines()[:1]})",
+            "Write the estimate again.",
+        ) from error
     if not known.chosen.first_frame:
         return estimate
     later = (estimate.frame_indices + known.chosen.first_frame).astype(np.int32)
@@ -39,7 +50,9 @@ def _require_read(chosen: EstimateConfig, kind: Kind) -> None:
     """Raise InputError for a setting that the kind would ignore."""
     default = EstimateConfig()
     for name in type(chosen).model_fields:
-        if name in _ALWAYS | READERS[kind].fields or getattr(chosen, name) == getattr(default, name):
+        if name in _ALWAYS | READERS[kind].fields or getattr(chosen, name) == getattr(
+            default, name
+        ):
             continue
         readers = [other.title for other in READERS.values() if name in other.fields]
         raise InputError(

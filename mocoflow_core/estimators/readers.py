@@ -61,7 +61,9 @@ READERS: dict[Kind, Reader] = {
         phalp.read,
         _reads("person", "shape", "focal_px", "first_frame"),
     ),
-    "gvhmr": Reader("GVHMR", gvhmr.recognises, gvhmr.read, _reads("shape", "focal_px", "first_frame")),
+    "gvhmr": Reader(
+        "GVHMR", gvhmr.recognises, gvhmr.read, _reads("shape", "focal_px", "first_frame")
+    ),
     "tram": Reader(
         "TRAM", tram.recognises, tram.read, _reads("person", "shape", "focal_px", "first_frame")
     ),

@@ -12,9 +12,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from mocoflow_core.body.smpl_model import SmplModel
+from mocoflow_core.body.blend_skinning import posed_joints
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators import bodies
 from mocoflow_core.estimators.bodies import Bodies
@@ -27,6 +26,7 @@ from mocoflow_core.estimators.placement import (
     middles,
     refocused,
     weak_translations,
+    where_known,
 )
 from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
 from mocoflow_core.estimators.tracks import Track, choose_track
@@ -66,7 +66,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
         faces=found.faces,
         coordinates="camera-root-centred",
         located=False,
-        first_translations=place(track, anchors, known),
+        first_translations=where_known(place(track, anchors, known)),
         remarks=(*chosen, *found.remarks),
     )
 
@@ -152,14 +152,11 @@ def _bodies(tool: str, track: Track, known: Known) -> Bodies:
     remarks = found.remarks
     if child > CHILD:
         remarks = (*remarks, f"the child's share of the shape, {child:.2f}, is left out")
-    hips = _hips(known.require_model(tool, "SMPL"), track.floats("smpl_thetas", 24, 3)[:, 0])
-    return Bodies(found.vertices - hips[:, None].astype(np.float32), found.faces, remarks)
-
-
-def _hips(model: SmplModel, root: Array) -> Array:
-    """The middle (T, 3) between both hips, from which BEV measures; ``root`` is axis-angle."""
-    pelvis, *sides = model.joint_regressor[:3] @ model.template
-    return pelvis + Rotation.from_rotvec(root).apply(np.mean(sides, axis=0) - pelvis)
+    # BEV measures from the middle between both hips.
+    model = known.require_model(tool, "SMPL")
+    joints = posed_joints(model, track.rotations("smpl_thetas", 24), np.median(betas, 0)[:10])
+    hips = joints[:, 1:3].mean(axis=1, keepdims=True)
+    return Bodies((found.vertices - hips).astype(np.float32), found.faces, remarks)
 
 
 def _romp_translations(track: Track, anchors: Array, known: Known) -> Array:

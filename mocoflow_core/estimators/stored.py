@@ -18,6 +18,7 @@ FOLDER_SUFFIXES = (".npy", ".npz", ".json", *MESH_SUFFIXES)
 SUBFOLDERS = ("hps",)
 _LAST_NUMBER = re.compile(r"(\d+)\D*$")
 _SHOWN = 12
+HIGHEST = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,15 +83,19 @@ def _is_wanted(file: Path) -> bool:
 
 
 def frame_numbers(names: Iterable[str]) -> list[int]:
-    """The last number in each name. Raises InputError for one without, or one that comes twice."""
+    """The last number in each name.
+
+    Raises InputError for a name without one, for one that comes twice, and for one that is no
+    frame's.
+    """
     numbers: dict[int, str] = {}
     for name in names:
         found = _LAST_NUMBER.search(Path(name).stem)
         number = int(found.group(1)) if found else None
-        if number is None or number in numbers:
+        if number is None or number in numbers or number > HIGHEST:
             raise InputError(
                 "files named by the numbers of their frames, each once, as in 000012.obj",
-                name if number is None else f"{numbers[number]} and {name}",
+                name if number is None or number > HIGHEST else f"{numbers[number]} and {name}",
                 "Rename or remove the file.",
             )
         numbers[number] = name

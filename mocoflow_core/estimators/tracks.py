@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
 
-Arrays = dict[str, NDArray[np.generic]]
+Arrays = Mapping[str, NDArray[np.generic]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Track:
             raise InputError(
                 f"{name} must have {expected} numbers, a row for each frame",
                 f"{given.shape}",
-                "Write the estimate again; with a forced meshes.kind, check that it is this tool's.",
+                "Write the estimate again, or check meshes.kind where it is forced.",
             )
         return np.asarray(given, np.float64).reshape(len(self), *shape)
 
@@ -99,9 +99,7 @@ def in_order(track: Track) -> Track:
     """The same track with rows ascending in time."""
     order = np.argsort(track.frame_indices, kind="stable")
     arrays = {name: rows[order] for name, rows in track.arrays.items()}
-    return Track(
-        track.person, track.frame_indices[order], arrays, track.constants, track.remarks
-    )
+    return Track(track.person, track.frame_indices[order], arrays, track.constants, track.remarks)
 
 
 def _listed(tracks: Sequence[Track]) -> str:
@@ -110,7 +108,28 @@ def _listed(tracks: Sequence[Track]) -> str:
     return ", ".join(f"person {track.person} ({len(track)} frames)" for track in tracks)
 
 
-def row_arrays(record: Mapping[object, object], count: int, but: str) -> Arrays:
+def frames_of(record: Mapping[str, object], name: str) -> NDArray[np.int32]:
+    """The numbers (n,) of the frames that a record's rows belong to.
+
+    Raises InputError where they are no whole numbers from 0.
+    """
+    given = np.asarray(record.get(name, ()))
+    numeric = given.dtype.kind in "iuf" or not given.size
+    if not numeric or (given != np.floor(given)).any() or not _in_range(given):
+        raise InputError(
+            f"{name} must be whole numbers from 0",
+            f"{given.ravel()[:3].tolist()}",
+            "Write the estimate again.",
+        )
+    return given.astype(np.int32).ravel()
+
+
+def _in_range(numbers: NDArray[np.generic]) -> bool:
+    highest = np.iinfo(np.int32).max
+    return not numbers.size or bool((numbers >= 0).all() and (numbers <= highest).all())  # type: ignore[operator]
+
+
+def row_arrays(record: Mapping[str, object], count: int, but: str) -> Arrays:
     """The arrays of a tool's record that have a row for each of ``count`` frames.
 
     ``but`` is the name of the frame numbers themselves. What a tool leaves None is left out.

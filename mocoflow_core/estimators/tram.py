@@ -18,7 +18,7 @@ from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.known import Known
 from mocoflow_core.estimators.placement import ToolCamera, placed
 from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
-from mocoflow_core.estimators.tracks import Arrays, Track, choose_track, row_arrays
+from mocoflow_core.estimators.tracks import Arrays, Track, choose_track, frames_of, row_arrays
 
 TOOL = "TRAM"
 PARTS = {"pred_rotmat", "pred_shape", "pred_trans", "frame"}
@@ -72,9 +72,7 @@ def _tracks(stored: Stored) -> list[Track]:
     constants = _constants(read_stored(camera)) if camera in stored.files(".npy") else {}
     files = _track_files(stored)
     numbers = frame_numbers(file.name for file in files)
-    return [
-        _track(k, read_stored(file), constants) for k, file in zip(numbers, files, strict=True)
-    ]
+    return [_track(k, read_stored(file), constants) for k, file in zip(numbers, files, strict=True)]
 
 
 def _track(person: int | None, content: object, constants: Arrays) -> Track:
@@ -84,7 +82,7 @@ def _track(person: int | None, content: object, constants: Arrays) -> Track:
             ", ".join(map(str, content)) if isinstance(content, Mapping) else "no dictionary",
             "Give results/<video>, or one of its hps/hps_track_<k>.npy.",
         )
-    frames = np.asarray(content["frame"], np.int32).ravel()
+    frames = frames_of(content, "frame")
     arrays = row_arrays(content, len(frames), "frame")
     return Track(person, frames, arrays, {**constants, **_constants(content)})
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.estimators.bodies import Bodies, modelled, stored as own_bodies
+from mocoflow_core.estimators.bodies import Bodies, modelled
+from mocoflow_core.estimators.bodies import stored as own_bodies
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.known import Known
 from mocoflow_core.estimators.placement import (
@@ -19,9 +20,10 @@ from mocoflow_core.estimators.placement import (
     middle,
     middles,
     weak_translations,
+    where_known,
 )
 from mocoflow_core.estimators.stored import Stored, people_of
-from mocoflow_core.estimators.tracks import Track, choose_track, row_arrays
+from mocoflow_core.estimators.tracks import Track, choose_track, frames_of, row_arrays
 from mocoflow_core.geometry.camera import Camera
 
 Array = NDArray[np.float64]
@@ -35,7 +37,9 @@ SAME_WIDTH = 0.005
 def recognises(stored: Stored) -> bool:
     """Records with a weak perspective camera, pose as axis-angle."""
     people = people_of(stored.content)
-    return bool(people) and all(is_cropped(one) and not has_matrices(one) for one in people.values())
+    return bool(people) and all(
+        is_cropped(one) and not has_matrices(one) for one in people.values()
+    )
 
 
 def is_cropped(record: Mapping[str, object]) -> bool:
@@ -69,13 +73,13 @@ def read_cropped(tool: str, factor: float, stored: Stored, known: Known) -> Body
         faces=bodies.faces,
         coordinates="camera-root-centred",
         located=False,
-        first_translations=translations,
+        first_translations=None if translations is None else where_known(translations),
         remarks=(*chosen, *bodies.remarks, *placed),
     )
 
 
 def _track(person: int, record: Mapping[str, object]) -> Track:
-    frames = np.asarray(record.get("frame_ids", ()), np.int32).ravel()
+    frames = frames_of(record, "frame_ids")
     return Track(person, frames, row_arrays(record, len(frames), "frame_ids"))
 
 

@@ -18,7 +18,7 @@ from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.known import Known
 from mocoflow_core.estimators.placement import ToolCamera, placed
 from mocoflow_core.estimators.stored import Stored, people_of
-from mocoflow_core.estimators.tracks import Track, choose_track, row_arrays
+from mocoflow_core.estimators.tracks import Track, choose_track, frames_of, row_arrays
 
 TOOL = "WHAM"
 # Names in the file and those of the API.
@@ -57,7 +57,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
 
 def _track(person: int, record: Mapping[str, object]) -> Track:
     name = next((name for name in FRAMES if name in record), FRAMES[0])
-    frames = np.asarray(record.get(name, ()), np.int32).ravel()
+    frames = frames_of(record, name)
     return Track(person, frames, row_arrays(record, len(frames), name))
 
 

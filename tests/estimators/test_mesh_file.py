@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.estimators.mesh_file import read_faces, read_mesh
+from mocoflow_core.estimators.mesh_file import read_mesh
 
 SEAM = """mtllib ../../outside.mtl
 usemtl skin
@@ -65,14 +65,3 @@ def test_a_glb_whose_data_lie_outside_is_refused(tmp_path):
     (tmp_path / "model.gltf").rename(tmp_path / "model.glb")
     with pytest.raises(InputError):
         read_mesh(tmp_path / "model.glb")
-
-
-def test_faces_come_from_a_mesh_or_from_our_own_file(tmp_path):
-    body = trimesh.creation.box()
-    body.export(tmp_path / "a.ply")
-    bodies = np.stack([body.vertices, body.vertices])
-    np.savez(tmp_path / "b.npz", vertices=bodies, faces=body.faces, frame_indices=[0, 1])
-    for name in ("a.ply", "b.npz"):
-        faces, count = read_faces(tmp_path / name)
-        assert count == 8
-        assert np.array_equal(faces, body.faces)
