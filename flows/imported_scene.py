@@ -37,7 +37,9 @@ def scene_folder(path: Path, without_bodies: bool) -> Path:
 
     kind = detect_kind(path)
     configuration = _defaults(kind, without_bodies)
-    folder = cache_folder() / "datasets" / f"{path.resolve().name}-{_key(path, configuration)}"
+    folder = (
+        cache_folder() / "datasets" / f"{path.resolve().name}-{import_key(path, configuration)}"
+    )
     if folder.is_dir():
         typer.echo(f"{path} is {kind.name}, imported before: {folder}", err=True)
         return folder
@@ -92,7 +94,8 @@ def _import(
     return imported
 
 
-def _key(source: Path, configuration: ConfigurationPart) -> str:
+def import_key(source: Path, configuration: ConfigurationPart) -> str:
+    """What an import depends on: the files of the data set and of body models, and the choices."""
     from mocoflow_core.datasets.import_dataset import ALGORITHM_VERSION
 
     given = getattr(configuration, "body_model", None)
@@ -108,8 +111,10 @@ def _key(source: Path, configuration: ConfigurationPart) -> str:
 def _stamps(folder: Path) -> list[list[object]]:
     """Name, size and time of every file: gigabytes of pictures are not read for their digest."""
     stamps: list[list[object]] = []
-    for file in sorted(folder.rglob("*")):
+    for file in sorted(folder.rglob("*")) if folder.is_dir() else [folder]:
         if file.is_file():
             status = file.stat()
-            stamps.append([str(file.relative_to(folder)), status.st_size, status.st_mtime_ns])
+            stamps.append(
+                [str(file.relative_to(folder.parent)), status.st_size, status.st_mtime_ns]
+            )
     return stamps

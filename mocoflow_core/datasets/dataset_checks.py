@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mocoflow_core.body.body_checks import (
     LEAST_OVERLAP,
@@ -27,7 +26,7 @@ from mocoflow_core.capture.checks import check_lens, check_share
 from mocoflow_core.capture.frame_selection import require_contiguous
 from mocoflow_core.capture.scene import UP_VECTORS
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene
-from mocoflow_core.datasets.sampled_masks import sample_masks
+from mocoflow_core.datasets.sampled_masks import SampledMasks, require_size, sample_masks
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
@@ -62,10 +61,14 @@ def check_dataset(scene: DatasetScene) -> DatasetFindings:
     findings = _check_counts(scene, train)
     for camera in scene.cameras.values():
         findings += _check_camera(camera)
-    for name, camera in scene.cameras.items():
-        if camera.masks is not None:
-            findings += _check_foreground(camera, required=name == scene.train_camera)
-    return findings + _check_body(scene) if scene.meshes else findings
+    sampled = {
+        name: sample_masks(camera.camera, camera.masks, camera.frames.indices)
+        for name, camera in scene.cameras.items()
+        if camera.masks is not None
+    }
+    for name, masks in sampled.items():
+        findings += _check_foreground(name, masks, required=name == scene.train_camera)
+    return findings + _check_body(scene, sampled) if scene.meshes else findings
 
 
 def _check_counts(scene: DatasetScene, train: DatasetCamera) -> DatasetFindings:
@@ -93,27 +96,11 @@ def _check_camera(recorded: DatasetCamera) -> DatasetFindings:
     camera, first = recorded.camera, recorded.frames.indices[:1].tolist()
     require_calibration(camera, "the data set's calibration")
     for number, image in recorded.frames.read(first):
-        _require_size(image, camera, f"frame {number} of {camera.name}")
-    if recorded.masks is not None:
-        for number, mask in recorded.masks.read(recorded.masks.indices[:1].tolist()):
-            _require_size(mask, camera, f"mask {number} of {camera.name}")
+        require_size(image, camera, f"frame {number} of {camera.name}")
     return DatasetFindings(warnings=check_lens(camera))
 
 
-def _require_size(picture: NDArray[np.generic], camera: Camera, what: str) -> None:
-    height, width = picture.shape[:2]
-    if (width, height) != (camera.width, camera.height):
-        raise InputError(
-            f"{what} must be {camera.width} x {camera.height} as the calibration says",
-            f"{width} x {height}",
-            "A picture that was turned, cropped or resized needs another calibration.",
-        )
-
-
-def _check_foreground(recorded: DatasetCamera, required: bool) -> DatasetFindings:
-    assert recorded.masks is not None
-    name = recorded.camera.name
-    sampled = sample_masks(recorded.camera, recorded.masks, recorded.frames.indices)
+def _check_foreground(name: str, sampled: SampledMasks, required: bool) -> DatasetFindings:
     shares = [float(mask.mean()) for mask in sampled.masks]
     share = float(np.median(shares)) if shares else 0.0
     if required and not any(shares):
@@ -124,7 +111,7 @@ def _check_foreground(recorded: DatasetCamera, required: bool) -> DatasetFinding
     return DatasetFindings({f"foreground_share of {name}": share}, warnings)
 
 
-def _check_body(scene: DatasetScene) -> DatasetFindings:
+def _check_body(scene: DatasetScene, sampled: dict[str, SampledMasks]) -> DatasetFindings:
     assert scene.meshes is not None
     sequence, train = scene.meshes.sequence, scene.cameras[scene.train_camera].camera
     require_shapes(sequence)
@@ -143,8 +130,9 @@ def _check_body(scene: DatasetScene) -> DatasetFindings:
         require_in_front(world, recorded.camera)
         distance, far = check_distance(world, recorded.camera)
         findings += DatasetFindings({f"distance_m of {name}": distance}, far)
-        if recorded.masks is not None:
-            findings += _check_overlap(recorded, world, required=name == scene.train_camera)
+        if name in sampled and len(sampled[name].numbers):
+            required = name == scene.train_camera
+            findings += _check_overlap(name, sampled[name], world, required)
     return findings
 
 
@@ -156,13 +144,10 @@ def meshes_in_world(meshes: DatasetMeshes, train_camera: Camera) -> MeshSequence
     return replace(meshes.sequence, vertices=vertices.astype(np.float32))
 
 
-def _check_overlap(recorded: DatasetCamera, world: MeshSequence, required: bool) -> DatasetFindings:
+def _check_overlap(
+    name: str, sampled: SampledMasks, world: MeshSequence, required: bool
+) -> DatasetFindings:
     """Silhouettes against masks, the meshes moved by -1, 0 and +1 frame."""
-    assert recorded.masks is not None
-    name = recorded.camera.name
-    sampled = sample_masks(recorded.camera, recorded.masks, world.frame_indices)
-    if not len(sampled.numbers):
-        return DatasetFindings()
     means = {shift: sampled.overlap(world, shift) for shift in SHIFTS}
     if required and means[0] < HOPELESS_OVERLAP:
         raise InputError(

@@ -118,7 +118,7 @@ def read_people_snapshot(
     fps = _rate(source)
     recorded = _recorded(camera, source, ChosenMasks(shrunk, numbers), numbers, configuration)
     remarks.append(
-        f"every {configuration.stride}. frame is learned from: {fps:g} / {configuration.stride} = "
+        f"one frame in {configuration.stride} is learned from: {fps:g} / {configuration.stride} = "
         f"{fps / configuration.stride:g} per second; frames between may be held out"
     )
     return DatasetScene(

@@ -51,9 +51,9 @@ def align_poses(
 def _in_words(
     alignment: PoseAlignment, surplus: int, shift: int, overlaps: dict[int, float]
 ) -> str:
-    side = "the first pose with the first frame" if shift == 0 else "the last with the last"
+    side = "from the first on" if shift == 0 else "from the last back"
     measured = ", ".join(f"{overlaps[shift + step]:.4f} at {step:+d}" for step in (-1, 0, 1))
-    text = f"poses are joined to frames {side} (shift {shift:+d}): overlap (IoU) {measured}"
+    text = f"poses and frames are joined {side} (shift {shift:+d}): overlap (IoU) {measured}"
     if alignment != "auto" or surplus == 0:
         return text
     other = surplus - shift

@@ -16,8 +16,8 @@ from mocoflow_core.body.smpl_file import read_smpl_model
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.geometry.camera import Camera
 from tests.capsule_person import room
-from tests.datasets.lossless_video import write_lossless
-from tests.datasets.python2_pickle import python2_pickle
+from tests.lossless_video import write_lossless
+from tests.python2_pickle import python2_pickle
 
 DISTORTION = [-0.5, 0.15, 0.004, -0.003, 0.02]
 FINER = 3  # Rays per pixel along each axis of what is then bent.

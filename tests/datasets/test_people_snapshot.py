@@ -15,9 +15,9 @@ from mocoflow_core.datasets.dataset_checks import check_dataset
 from mocoflow_core.datasets.people_snapshot import PeopleSnapshotConfig, read_people_snapshot
 from mocoflow_core.datasets.write_dataset import write_dataset
 from mocoflow_core.errors import InputError
-from tests.datasets.lossless_video import write_lossless
 from tests.datasets.snapshot_layout import turning, write_snapshot
-from tests.small_smpl import write_small_smpl
+from tests.lossless_video import write_lossless
+from tests.small_smpl import write_smpl
 
 FRAMES, SIDE = 12, 96
 
@@ -25,7 +25,7 @@ FRAMES, SIDE = 12, 96
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
-    write_small_smpl(folder / "basicModel_f_lbs_10_207_0_v1.0.0.npz")
+    write_smpl(folder / "basicModel_f_lbs_10_207_0_v1.0.0.pkl")
     return folder
 
 

@@ -15,7 +15,7 @@ from mocoflow_core.datasets.snapshot_files import (
     read_tracked_body,
 )
 from mocoflow_core.errors import InputError
-from tests.datasets.python2_pickle import python2_pickle
+from tests.python2_pickle import python2_pickle
 
 CAMERA = {
     "camera_f": np.array([2100.0, 2110.0]),
