@@ -8,9 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.datasets.aist import read_aist
+from mocoflow_core.datasets.aist_configuration import AistConfig
+from mocoflow_core.datasets.aist_files import missing_parts as missing_in_aist
 from mocoflow_core.datasets.dataset_scene import DatasetScene
 from mocoflow_core.datasets.people_snapshot import PeopleSnapshotConfig, read_people_snapshot
 from mocoflow_core.datasets.snapshot_files import missing_parts as missing_in_people_snapshot
+from mocoflow_core.datasets.zju_annotations import missing_parts as missing_in_zju_mocap
+from mocoflow_core.datasets.zju_mocap import ZjuMocapConfig, read_zju_mocap
 
 
 @dataclass(frozen=True)
@@ -32,5 +37,7 @@ KINDS = {
             read_people_snapshot,
             missing_in_people_snapshot,
         ),
+        DatasetKind("zju-mocap", ZjuMocapConfig, read_zju_mocap, missing_in_zju_mocap),
+        DatasetKind("aist", AistConfig, read_aist, missing_in_aist),
     )
 }
