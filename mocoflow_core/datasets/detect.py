@@ -43,7 +43,7 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
         listed = ", ".join(subjects[:_NAMED_SUBJECTS])
         raise InputError(
             "the folder of one subject",
-            f"{folder} with {len(subjects)} of them ({listed}{', ...' * (len(subjects) > 5)})",
+            f"{folder} with {len(subjects)} of them ({listed}{', ...' * (len(subjects) > _NAMED_SUBJECTS)})",
             f"Name one, as {folder / subjects[0]}.",
         )
     nearest = sorted(missing, key=lambda name: len(missing[name]))
@@ -52,13 +52,6 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
         "a folder with a scene.json or of a known data set",
         f"{folder}, which is none",
         f"To be one it would need: {lacks}.",
-    )
-
-
-def looks_like_dataset(folder: Path) -> bool:
-    """Whether a folder is of exactly one kind, or holds such folders."""
-    return folder.is_dir() and (
-        any(not kind.missing(folder) for kind in KINDS.values()) or bool(_subjects(folder, KINDS))
     )
 
 
