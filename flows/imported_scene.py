@@ -57,10 +57,10 @@ def scene_folder(path: Path, without_bodies: bool, body_model: Path | None = Non
 
 
 def tell(imported: ImportedDataset) -> None:
-    """Print what was assumed and measured, and what is unusual, on stderr."""
+    """Print what was assumed, measured of the train camera, and unusual, on stderr."""
     for remark in imported.remarks:
         typer.echo(f"  {remark}", err=True)
-    measured = ", ".join(f"{name} {value:.4g}" for name, value in imported.measured.items())
+    measured = ", ".join(f"{name} {value:.4g}" for name, value in imported.of_train_camera.items())
     typer.echo(f"  measured: {measured}", err=True)
     for warning in imported.warnings:
         typer.echo(f"  warning: {warning}", err=True)

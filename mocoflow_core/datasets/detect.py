@@ -40,10 +40,11 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
             "a folder of one data set", f"one of {names}", "Name the kind: mocoflow import KIND."
         )
     if subjects := _subjects(folder, kinds):
-        listed = ", ".join(subjects[:_NAMED_SUBJECTS])
+        more = ", ..." if len(subjects) > _NAMED_SUBJECTS else ""
+        listed = ", ".join(subjects[:_NAMED_SUBJECTS]) + more
         raise InputError(
             "the folder of one subject",
-            f"{folder} with {len(subjects)} of them ({listed}{', ...' * (len(subjects) > _NAMED_SUBJECTS)})",
+            f"{folder} with {len(subjects)} of them ({listed})",
             f"Name one, as {folder / subjects[0]}.",
         )
     nearest = sorted(missing, key=lambda name: len(missing[name]))
