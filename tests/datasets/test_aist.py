@@ -13,7 +13,7 @@ from mocoflow_core.metrics.mask_iou import mask_iou
 from tests.datasets.aist_layout import SEQUENCE, AistLayout, write_aist
 from tests.datasets.studio import CLOTHES, Y_UP, studio
 
-NAMES = ("c01", "c05", "c08", "c09")
+NAMES = ("c01", "c05", "c07", "c08", "c09")
 FRAMES = 20
 
 
@@ -131,7 +131,7 @@ def test_annotations_that_are_nowhere_are_asked_for(tmp_path):
 
 def test_missing_views_are_tolerated_and_told(tmp_path, filmed):
     scene = read(write_aist(tmp_path, filmed, None, layout=AistLayout(missing_videos=("c05",))))
-    assert set(scene.cameras) == {"c01", "c08", "c09"}
+    assert set(scene.cameras) == set(NAMES) - {"c05"}
     assert said(scene, "gWA_sFM_c05_d27_mWA5_ch20 is not there")
 
 
@@ -147,16 +147,20 @@ def test_the_two_videos_that_were_never_released_are_known(tmp_path, filmed, seq
 
 def test_without_the_train_video_those_present_are_told(tmp_path, filmed):
     folder = write_aist(tmp_path, filmed, None, layout=AistLayout(missing_videos=("c09",)))
-    with pytest.raises(InputError, match="videos of c01, c05, c08"):
+    with pytest.raises(InputError, match="videos of c01, c05, c07, c08"):
         read(folder)
 
 
-def test_a_view_that_is_not_synchronised_is_left_out(tmp_path, filmed):
-    layout = AistLayout(sequence="gBR_sBM_cAll_d04_mBR0_ch01", setting="setting1")
-    folder = write_aist(tmp_path, filmed, None, layout=layout)
+@pytest.mark.parametrize(
+    ("sequence", "camera"),
+    [("gBR_sBM_cAll_d04_mBR0_ch01", "c05"), ("gJB_sBM_cAll_d07_mJB3_ch05", "c07")],
+    ids=["not synchronised", "640 x 480"],
+)
+def test_views_known_to_be_wrong_are_left_out(tmp_path, filmed, sequence, camera):
+    folder = write_aist(tmp_path, filmed, None, layout=AistLayout(sequence=sequence))
     scene = read(folder)
-    assert set(scene.cameras) == {"c01", "c08", "c09"}
-    assert said(scene, "gBR_sBM_c05_d04_mBR0_ch01 is left out")
+    assert set(scene.cameras) == set(NAMES) - {camera}
+    assert said(scene, f"{sequence.replace('cAll', camera)} is left out")
     assert set(read(folder, left_out_views=()).cameras) == set(NAMES)
 
 
