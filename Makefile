@@ -15,8 +15,9 @@ $(INSTALLED): pyproject.toml constraints.txt
 demo: install
 	$(BIN)/mocoflow demo --out demo
 
+# A file's tests stay together: they share what they make.
 test: install
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 stability: install
 	$(BIN)/mocoflow stability --out stability

@@ -18,7 +18,7 @@ from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.training.clock import Seconds
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # train_psnr along the curve.
+ALGORITHM_VERSION = 3  # Distances to the truth at some frames of the clip.
 
 
 @stage(ScoresArtifact, ALGORITHM_VERSION)

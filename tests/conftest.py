@@ -22,6 +22,8 @@ os.environ |= {
     "PREFECT_LOGGING_TO_API_ENABLED": "false",
     "PREFECT_LOGGING_LEVEL": "CRITICAL",
     "PREFECT_API_BLOCKS_REGISTER_ON_START": "false",
+    # As many processes test as there are cores.
+    "OMP_NUM_THREADS": "1",
 }
 
 

@@ -16,6 +16,8 @@ from safetensors.numpy import load_file, save_file
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from mocoflow_core.geometry.nearest_rotation import rotation_by_svd
+
 Array = NDArray[np.float32]
 
 # Pulls rotations that a neighbourhood does not determine (flat, line-like or tiny ones) towards
@@ -168,10 +170,7 @@ def best_rotation(source: Array, target: Array, fallback: Array | None = None) -
     if fallback is not None:
         extent = (source * source).sum((-1, -2))[..., None, None]
         covariance = covariance + _GLOBAL_PULL * np.maximum(extent, _ONE_POINT) * fallback
-    u, _, vt = np.linalg.svd(covariance.astype(np.float64))
-    handed = np.ones(u.shape[:-1])
-    handed[..., -1] = np.sign(np.linalg.det(u @ vt))
-    return ((u * handed[..., None, :]) @ vt).astype(np.float32)
+    return rotation_by_svd(covariance).astype(np.float32)
 
 
 def _thin(points: Array, spacing: float) -> NDArray[np.int64]:

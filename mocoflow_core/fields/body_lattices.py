@@ -16,6 +16,7 @@ from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
 from mocoflow_core.geometry.grid import SparseGrids
+from mocoflow_core.geometry.nearest_rotation import nearest_rotation
 
 Array = NDArray[np.float32]
 
@@ -135,7 +136,7 @@ def _node_maps(
 ) -> Array:
     """Affine maps (N, 4, 3) of nodes from the rigid motion of the controls near them."""
     near, weights = blending
-    blended = _nearest_rotation(np.einsum("nk,nkij->nij", weights, rotations[near]))
+    blended = nearest_rotation(np.einsum("nk,nkij->nij", weights, rotations[near]))
     moved = np.einsum("nkij,nkj->nki", rotations[near], nodes[:, None] - source[near])
     mapped = np.einsum("nk,nki->ni", weights, moved + target[near])
     shift = mapped - np.einsum("nij,nj->ni", blended, nodes)
@@ -150,14 +151,6 @@ def _side_and_normals(
     mapped = (torch.from_numpy(nodes)[:, None] @ turn)[:, 0] + torch.from_numpy(maps[:, 3])
     normals = (turn @ prior.normals(mapped)[..., None])[..., 0]
     return (prior(mapped) < 0).numpy(), normals
-
-
-def _nearest_rotation(matrices: Array) -> Array:
-    """The rotation nearest to each blended matrix (..., 3, 3), by the polar decomposition."""
-    u, _, vt = np.linalg.svd(matrices.astype(np.float64))
-    handed = np.ones(u.shape[:-1])
-    handed[..., -1] = np.sign(np.linalg.det(u @ vt))
-    return (u * handed[..., None, :]) @ vt
 
 
 def _pack(lattices: list[Lattice], spacing: float) -> SparseGrids:

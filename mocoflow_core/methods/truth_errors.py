@@ -32,14 +32,16 @@ from mocoflow_core.metrics.keypoints import (
     regress_keypoints,
 )
 from mocoflow_core.metrics.table import ScoreRow
+from mocoflow_core.metrics.views import spread_frames
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
 
 Points = NDArray[np.float64]
 
 
 class TruthConfig(ConfigurationPart):
-    """How many points and pairs of frames the distances are taken over."""
+    """How many frames, points and pairs of frames the distances are taken over."""
 
+    frames: int = Field(24, ge=2, description="At most so many frames, spread over the clip.")
     points: int = Field(400, ge=1, description="Surface points, evenly spread over the vertices.")
     pairs_per_frame: int = Field(2, ge=1, description="Other frames each frame is reached from.")
     seed: int = Field(0, ge=0, description="Draws the pairs.")
@@ -117,17 +119,20 @@ def motion_rows(
     truth: Path | None,
     configuration: TruthConfig,
 ) -> list[ScoreRow]:
-    """Errors of the motion at the clip's frames, of the given body's (as ``posed_mesh``) and ours.
+    """Errors of the motion over the clip, of the given body's (as ``posed_mesh``) and ours.
 
     ``consensus_local_mm`` and ``consensus_global_mm`` need no truth; the distances to the truth
     appear where it holds vertices or keypoints. All rows stand under the train camera's name.
     """
-    given = meshes.at(clip.frame_indices)
+    before = GivenMotion(clip, meshes.at(clip.frame_indices), configuration)
     learned = LearnedMotion(renderer)
+    chosen = spread_frames(clip.frame_indices, configuration.frames)
+    clip = clip.at_rows(np.isin(clip.frame_indices, chosen))
+    given = meshes.at(clip.frame_indices)
     canonical = canonical_vertices.astype(np.float64)
     placed = np.stack([learned.to_observed(canonical, int(i)) for i in clip.frame_indices])
     states = (
-        ("posed_mesh", GivenMotion(clip, given, configuration), given.vertices.astype(np.float64)),
+        ("posed_mesh", before, given.vertices.astype(np.float64)),
         ("mocoflow", learned, placed),
     )
     rows = []
@@ -225,7 +230,8 @@ def _spread(points: Points, count: int) -> Points:
 
 def _protocol(configuration: TruthConfig) -> str:
     return (
-        f"distances in mm over {configuration.points} surface points, each frame reached from "
+        f"distances in mm over {configuration.points} surface points at {configuration.frames} "
+        "frames of the clip at most, each reached from "
         f"{configuration.pairs_per_frame} others; keypoints by the mesh's regressor, or carried "
         "between frames where it has none"
     )

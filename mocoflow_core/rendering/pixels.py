@@ -55,8 +55,14 @@ def shell_pixels(camera: Camera, body: BodyMotion, row: int, shell_width_m: floa
 
 def _paint(camera: Camera, at: NDArray, radius: NDArray, depth: NDArray) -> NDArray[np.float32]:
     image = np.zeros((camera.height, camera.width), np.float32)
-    limit = 4 * (camera.width + camera.height)
-    for (x, y), r, value in zip(at, radius, depth, strict=True):
-        if abs(x) < limit and abs(y) < limit:
-            cv2.circle(image, (int(x), int(y)), int(r), float(value), -1)
+    near_image = (np.abs(at) < 4 * (camera.width + camera.height)).all(axis=1)
+    # Plain numbers: taking them out of arrays one by one costs more than the painting.
+    discs = zip(
+        at[near_image].astype(int).tolist(),
+        radius[near_image].astype(int).tolist(),
+        depth[near_image].tolist(),
+        strict=True,
+    )
+    for centre, r, value in discs:
+        cv2.circle(image, centre, r, value, -1)
     return image

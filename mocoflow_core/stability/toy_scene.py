@@ -23,6 +23,7 @@ from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
 from mocoflow_core.fields.hybrid_field import HybridField
 from mocoflow_core.fields.motion_residual import ResidualConfig
+from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.fields.scene_shape import MotionConfig, SceneShape
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.metrics.psnr import psnr
@@ -38,6 +39,7 @@ from mocoflow_core.training.fit_motion import MotionStart, fit_motion
 from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.objective import ShellObjective
 from mocoflow_core.training.pretrain_density import DensityConfig, pretrain_density
+from mocoflow_core.training.problem import Learned, shell_problem
 from mocoflow_core.training.schedule import ScheduleConfig
 
 SHELL_M = 0.06
@@ -95,7 +97,7 @@ class Prepared:
 class Outcome:
     """What an optimisation left."""
 
-    field: HybridField
+    field: SceneField
     events: list[str]
     psnr: float  # dB, at views of another camera, over the union of both masks
 
@@ -159,11 +161,12 @@ def train(
 
     Raises TrainingDiverged as the loop does.
     """
-    field = prepared.field(seed)
+    problem = shell_problem(
+        prepared.density, prepared.motion, prepared.shape, Learned(), LOSSES, seed
+    )
     with tempfile.TemporaryDirectory() as folder:
         run = TrainingRun(
-            field,
-            prepared.objective(field),
+            problem,
             prepared.pixels(),
             schedule,
             seed,
@@ -178,8 +181,8 @@ def train(
         run.run()
     events = [f"step {event.step}: {event.what}" for event in run.progress.events]
     judged = prepared.field()
-    judged.load_state_dict(field.state_dict())  # in float32, whatever it was trained in
-    return Outcome(field, events, score(prepared, judged, filmed(seen)[2]))
+    judged.load_state_dict(problem.field.state_dict())  # in float32, whatever it was trained in
+    return Outcome(problem.field, events, score(prepared, judged, filmed(seen)[2]))
 
 
 @cache

@@ -14,6 +14,7 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.rays import Rays, pixel_rays
 from mocoflow_core.rendering.posed_scene import PosedScene
 from mocoflow_core.training.held_out import HeldOutPixels
+from mocoflow_core.training.ranks import Ranks
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,9 @@ class Batch:
     background: Tensor  # (R, 3)
     jitter: Tensor  # (R, J) in [0, 1), as many as the scene's rays take
 
-    def part(self, rows: slice, device: torch.device) -> Batch:
-        """Some of the rays, on a device."""
+    def own_part(self, ranks: Ranks) -> Batch:
+        """The rays that are this rank's, on its device: all ranks draw the same batch."""
+        rows, device = ranks.part(len(self.rays)), ranks.device
 
         def these(values: Tensor) -> Tensor:
             return values[rows].to(device)

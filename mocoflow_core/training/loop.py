@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import TypeVar
 
 import torch
-from pydantic import JsonValue
 from torch import Tensor
 
-from mocoflow_core.fields.scene_field import SceneField
 from mocoflow_core.threads import choose_threads, seconds_of, torch_threads
 from mocoflow_core.training.averaged_weights import AveragedWeights
-from mocoflow_core.training.batches import Batch, PixelSource
+from mocoflow_core.training.batches import PixelSource
 from mocoflow_core.training.checkpoint import (
     Progress,
     Restored,
@@ -28,17 +26,17 @@ from mocoflow_core.training.checkpoint import (
 )
 from mocoflow_core.training.clock import Seconds, TrainingClock, snapshot_due
 from mocoflow_core.training.guard import Guard
-from mocoflow_core.training.objective import Objective
+from mocoflow_core.training.objective import sum_of
+from mocoflow_core.training.optimiser import build_optimiser
 from mocoflow_core.training.pace import plan_pace, plan_rays
-from mocoflow_core.training.ranks import ALONE, Ranks
+from mocoflow_core.training.problem import Problem
+from mocoflow_core.training.ranks import Ranks
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
 from mocoflow_core.training.snapshots import Snapshot, forget_snapshots, keep_snapshot
+from mocoflow_core.training.trial_steps import TrialSteps
 
 _REMEMBER_EVERY = 50  # steps between the states that the guard can go back to
 _ALLOWED_EVENTS = 20
-# That tell how large the losses are at the start: of a single frame they may be next to nothing.
-_START_RAYS = 1024
-_START_FRAMES = 16
 
 Score = Callable[[], float]
 Chosen = TypeVar("Chosen", int, int | None)
@@ -52,16 +50,14 @@ class TrainingRun:
     """One optimisation, started or resumed.
 
     ``score`` is ``train_psnr`` of the held-out pixels, asked while the clock stands still; each
-    snapshot hands the curve so far to ``watch``. Without a watcher none are kept. ``made_with`` is
-    what a checkpoint must have been made with. Of several ranks each runs one; all take the same
-    decisions, as these depend on joint losses and on the first rank's clock, and only the first
-    one scores, writes and reports.
+    snapshot hands the curve so far to ``watch``. Without a watcher none are kept. Of several ranks
+    each runs one; all take the same decisions, as these depend on joint losses and on the first
+    rank's clock, and only the first one scores, writes and reports.
     """
 
     def __init__(
         self,
-        field: SceneField,
-        objective: Objective,
+        problem: Problem,
         pixels: PixelSource,
         schedule: ScheduleConfig,
         seed: int,
@@ -71,11 +67,12 @@ class TrainingRun:
         watch: Callable[[list[Snapshot]], None] | None,
         score: Score | None,
         clock: TrainingClock,
-        ranks: Ranks = ALONE,
-        made_with: Mapping[str, JsonValue] = MappingProxyType({}),
     ) -> None:
-        self.field = field
-        self.objective = objective
+        self.field = field = problem.field
+        self.objective = problem.objective
+        self.ranks = ranks = problem.ranks
+        self.from_scratch = problem.from_scratch
+        self.made_with = {**problem.settings, "schedule": schedule.deciding(), "seed": seed}
         self.pixels = pixels
         self.schedule = schedule
         self.before = before
@@ -84,12 +81,10 @@ class TrainingRun:
         self.watch = watch
         self.score = score
         self.clock = clock
-        self.ranks = ranks
-        self.made_with = made_with
         self.generator = torch.Generator().manual_seed(seed)
         # Torch loads its compiler with the first optimiser, for seconds: an import, not work.
         with clock.paused():
-            self.optimiser = _optimiser(field, schedule)
+            self.optimiser = build_optimiser(field, schedule)
         self.average = AveragedWeights(field, schedule.averaging)
         self._base_rates = [group["lr"] for group in self.optimiser.param_groups]
         self._losses: deque[dict[str, float]] = deque(maxlen=50)
@@ -157,14 +152,16 @@ class TrainingRun:
     def _first_start(self) -> Progress:
         """What a resumed run must find again: threads, steps and rays."""
         schedule = self.schedule
-        threads = choose_threads(self._threads(schedule.threads), self._try_out)
+        trial = TrialSteps(self.field, self.objective, self.pixels, schedule, self.ranks)
+        threads = choose_threads(self._threads(schedule.threads), trial.step)
         rays = schedule.rays
         left_s = self._left_s()
         if left_s is not None and left_s > 0:
             with torch_threads(threads):
-                step_s = seconds_of(self._try_out)
+                step_s = seconds_of(trial.step)
             rays = self.ranks.first(lambda: plan_rays(schedule, left_s, step_s))
-        best = self._start_loss()
+        # An empty picture is close to a white wall; the first fog that is learned is not.
+        best = math.inf if self.from_scratch else trial.loss()
         now = self._now()
         steps = plan_pace(schedule, self.before.wall, now.wall).steps
         return Progress(threads, steps, rays, started_s=now.wall, elapsed=now, best=best)
@@ -203,30 +200,6 @@ class TrainingRun:
         of = f" of {self.pace.steps}" if self.pace.available_s is None else ""
         return f"step {self.progress.step}{of}"
 
-    def _try_out(self) -> None:
-        """The work of a step without its effect: for choosing the number of threads."""
-        generator = torch.Generator().manual_seed(0)
-        batch = self.pixels.batch(self.schedule.rays, self.schedule.frames_per_step, generator)
-        _sum(self.objective(self._mine(batch), generator)).backward()
-        self.optimiser.zero_grad(set_to_none=True)
-
-    @torch.no_grad()
-    def _start_loss(self) -> float:
-        """What the losses sum to before anything is learned, over enough rays and frames."""
-        generator = torch.Generator().manual_seed(0)
-        frames = self.schedule.frames_per_step
-        batches = -(-_START_FRAMES // frames)
-        rays = -(-max(self.schedule.rays, _START_RAYS) // batches)
-        found = 0.0
-        for _ in range(batches):
-            own = self._mine(self.pixels.batch(rays, frames, generator))
-            found += float(self.ranks.total(_sum(self.objective(own, generator))))
-        return found / batches
-
-    def _mine(self, batch: Batch) -> Batch:
-        """All ranks draw the same rays; each looks along its own."""
-        return batch.part(self.ranks.part(len(batch.rays)), self.ranks.device)
-
     def _step(self, share: float) -> None:
         """One update, at a share of the schedule between 0 and 1."""
         schedule, step = self.schedule, self.progress.step
@@ -236,10 +209,10 @@ class TrainingRun:
         for group, base in zip(self.optimiser.param_groups, self._base_rates, strict=True):
             group["lr"] = base * factor
         batch = self.pixels.batch(self.progress.rays, schedule.frames_per_step, self.generator)
-        own_terms = self._shared(self._mine(batch), self.generator)
+        own_terms = self._shared(batch.own_part(self.ranks), self.generator)
         self.optimiser.zero_grad(set_to_none=True)
         # Gradients become means over ranks; the losses are sums over them.
-        (_sum(own_terms) * self.ranks.count).backward()
+        (sum_of(own_terms) * self.ranks.count).backward()
         terms = _joint(own_terms, self.ranks)
         problem = self.pixels.problem(batch) or self.guard.problem(terms)
         # These weights have just given finite losses and gradients; the next ones are unknown.
@@ -304,21 +277,7 @@ class TrainingRun:
         self.ranks.first(save)
 
 
-def _sum(terms: Mapping[str, Tensor]) -> Tensor:
-    return torch.stack(list(terms.values())).sum()
-
-
 def _joint(terms: dict[str, Tensor], ranks: Ranks) -> dict[str, Tensor]:
     """The losses of all rays."""
     summed = ranks.total(torch.stack([value.detach() for value in terms.values()]))
     return dict(zip(terms, summed, strict=True))
-
-
-def _optimiser(field: SceneField, schedule: ScheduleConfig) -> torch.optim.Optimizer:
-    rates = (schedule.rate_features, schedule.rate_networks, schedule.rate_motion)
-    groups = [
-        {"params": parameters, "lr": rate}
-        for parameters, rate in zip(field.rate_groups(), rates, strict=True)
-    ]
-    betas = (0.9, schedule.adam_beta2)
-    return torch.optim.Adam(groups, betas=betas, eps=schedule.adam_epsilon, fused=True)

@@ -40,6 +40,7 @@ from mocoflow_core.training.ranks import ALONE, Ranks
 from mocoflow_core.training.schedule import ScheduleConfig
 
 _WEIGHTS = "model.safetensors"
+_RESULT = "stage.json"  # of a stage that was trained
 _MOST_EMPTY = 0.5  # of the mesh's vertices, which lie on the surface itself
 
 Progress = Callable[[float, str], None]
@@ -172,8 +173,9 @@ def network_problem(
     consensus = learned.consensus and field.moves
     objective = NetworkObjective(scene, losses, consensus, ranks=ranks)
     settings = _settings(space, learned, losses)
+    from_scratch = not (folder / _RESULT).exists()
     faults = partial(missing_density, field, space.canonical_vertices)
-    return Problem(space, field, scene, objective, settings, ranks, faults)
+    return Problem(space, field, scene, objective, settings, ranks, from_scratch, faults)
 
 
 def _settings(space: BoxSpace, learned: Learned, losses: LossConfig) -> dict[str, JsonValue]:
@@ -236,8 +238,7 @@ def _train(
     clock: TrainingClock | None,
 ) -> StageResult:
     run = TrainingRun(
-        problem.field,
-        problem.objective,
+        problem,
         pixels,
         schedule,
         seed,
@@ -247,15 +248,13 @@ def _train(
         None,
         None,
         clock or TrainingClock(),
-        problem.ranks,
-        {**problem.settings, "schedule": schedule.deciding(), "seed": seed},
     )
     run.run()
     save_file(problem.field.state_dict(), workspace / _WEIGHTS)
     done = run.progress
     events = [asdict(event) for event in done.events]
     result = StageResult(done.step, done.threads, done.tries, events, run.recent_losses)
-    (workspace / "stage.json").write_text(json.dumps(asdict(result)))
+    (workspace / _RESULT).write_text(json.dumps(asdict(result)))
     run.forget_checkpoint()
     return result
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 import torch
@@ -23,6 +24,11 @@ class Objective(Protocol):
 
     def __call__(self, batch: Batch, generator: torch.Generator) -> dict[str, Tensor]:
         """All terms; further random numbers come from the generator."""
+
+
+def sum_of(terms: Mapping[str, Tensor]) -> Tensor:
+    """What is minimised."""
+    return torch.stack(list(terms.values())).sum()
 
 
 class ShellObjective:

@@ -91,8 +91,7 @@ def optimise_scene(
     pixels = TrainingPixels(clip, problem.scene, held_out)
     ranks.first(lambda: _begin(problem, workspace))
     run = TrainingRun(
-        problem.field,
-        problem.objective,
+        problem,
         pixels,
         schedule,
         seed,
@@ -102,8 +101,6 @@ def optimise_scene(
         watch,
         score,
         clock,
-        problem.ranks,
-        {**problem.settings, "schedule": schedule.deciding(), "seed": seed},
     )
     run.run()
     return OptimisationResult.from_json(

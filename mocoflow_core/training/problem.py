@@ -38,6 +38,7 @@ class Problem:
     objective: Objective
     settings: dict[str, JsonValue]  # that make it this problem and no other
     ranks: Ranks = ALONE  # that share its rays
+    from_scratch: bool = False  # nothing was learned before that could be lost
     faults: Callable[[], tuple[str, ...]] = tuple  # sentences about the present weights
 
 

@@ -12,9 +12,11 @@ from mocoflow_core.fields.skip_network import SkipConfig
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.rendering.frame_box import BoxConfig
 from mocoflow_core.rendering.trained_scene import TrainedScene
-from mocoflow_core.training.clock import Seconds
+from mocoflow_core.training.batches import TrainingPixels
+from mocoflow_core.training.clock import Seconds, TrainingClock
 from mocoflow_core.training.fit_points import FitPoints
 from mocoflow_core.training.guard import TrainingDiverged
+from mocoflow_core.training.loop import TrainingRun
 from mocoflow_core.training.mesh_views import MeshViewsConfig, cameras_around
 from mocoflow_core.training.network_stages import (
     fit_networks,
@@ -148,6 +150,22 @@ def test_the_same_seed_gives_the_same_weights(prepared, pretrained, tmp_path):
 def test_a_stage_without_its_input_is_an_error_never_a_start_from_scratch(prepared, tmp_path):
     with pytest.raises(FileNotFoundError):
         network_problem(tmp_path, prepared.clip, Learned(), LOSSES, 0)
+
+
+def test_what_starts_from_scratch_may_see_its_losses_rise_at_first(prepared, fitted, tmp_path):
+    """An empty picture is close to a white wall; the first fog that is learned is not."""
+    nothing = SCHEDULE.model_copy(update={"pretrain_steps": 0, "fit_steps": 0})
+    pretrain(prepared, tmp_path / "empty", nothing)
+    fit(prepared, tmp_path / "empty", tmp_path / "scratch", nothing)
+    expected = {}
+    for folder in (tmp_path / "scratch", fitted):
+        problem = network_problem(folder, prepared.clip, Learned(), LOSSES, 0)
+        pixels = TrainingPixels(prepared.clip, problem.scene)
+        into = (tmp_path / "run", silent, None, None, TrainingClock())
+        run = TrainingRun(problem, pixels, SCHEDULE, 0, Seconds(), *into)
+        expected[problem.from_scratch] = run.guard.best
+    assert expected[True] == np.inf
+    assert expected[False] < 100.0
 
 
 def test_the_density_is_the_same_function_before_and_after_a_stage(prepared, pretrained, fitted):

@@ -377,7 +377,7 @@ def test_a_plant_in_a_checkpoint_is_refused_in_words(prepared: Prepared, tmp_pat
 
 
 def test_weights_that_the_very_last_update_spoils_are_not_kept(prepared, tmp_path, monkeypatch):
-    made = loop._optimiser
+    made = loop.build_optimiser
 
     def spoiling(field, schedule):
         optimiser = made(field, schedule)
@@ -392,7 +392,7 @@ def test_weights_that_the_very_last_update_spoils_are_not_kept(prepared, tmp_pat
         optimiser.step = step
         return optimiser
 
-    monkeypatch.setattr(loop, "_optimiser", spoiling)
+    monkeypatch.setattr(loop, "build_optimiser", spoiling)
     result = train(prepared, tmp_path)
     assert all(torch.isfinite(value).all() for value in parameters(tmp_path).values())
     assert [event["step"] for event in result.events] == [SCHEDULE.joint_steps]

@@ -40,7 +40,7 @@ def test_the_ranks_batches_are_the_parts_of_one(prepared):
     whole = TrainingPixels(prepared.clip, prepared.scene()).batch(
         50, 4, torch.Generator().manual_seed(0)
     )
-    parts = [whole.part(Share(rank, 3).part(50), ALONE.device) for rank in range(3)]
+    parts = [whole.own_part(Share(rank, 3)) for rank in range(3)]
     for name in ("row", "near", "far", "rgb", "mask", "background", "jitter"):
         joined = torch.cat([getattr(part, name) for part in parts])
         assert torch.equal(joined, getattr(whole, name)), name
@@ -87,7 +87,7 @@ def gradients(prepared: Prepared, kind: str, rays: int, ranks: Ranks, empty: boo
         gone = torch.arange(rays) >= rays // 2
         batch = replace(batch, far=torch.where(gone, batch.near, batch.far))
     losses_of = ranks.share(problem.field, problem.objective)
-    terms = losses_of(batch.part(ranks.part(rays), ranks.device), generator)
+    terms = losses_of(batch.own_part(ranks), generator)
     (torch.stack(list(terms.values())).sum() * ranks.count).backward()
     losses = {name: float(ranks.total(value.detach())) for name, value in terms.items()}
     named = problem.field.named_parameters()
