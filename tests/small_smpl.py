@@ -77,6 +77,7 @@ _BONES = {
 }
 _ENDS = {"crown": (0, 0.46, 0.03), "l_toes": (0.13, -1.14, 0.15), "l_tips": (0.85, 0.22, -0.03)}
 _BLEND_M = 0.02  # over which neighbouring parts melt into each other
+_REACH_M = 0.2  # beyond which they do not
 _WEIGHT_FALL_M = 0.025
 
 
@@ -207,25 +208,30 @@ def _surface(vertices: int) -> tuple[np.ndarray, np.ndarray]:
 def _cut(step: float) -> tuple[np.ndarray, np.ndarray]:
     low, high = np.array([-1.0, -1.3, -0.3]), np.array([1.0, 0.7, 0.35])
     axes = [np.arange(a, b, step) for a, b in zip(low, high, strict=True)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    # The gradient of a distance points outwards, as "descent" wants it for outward faces.
-    points, faces, _, _ = marching_cubes(_distance(grid), 0.0, spacing=(step,) * 3)
+    points, faces, _, _ = marching_cubes(_distance(axes), 0.0, spacing=(step,) * 3)
     points, faces = points.astype(float) + low, faces.astype(np.int64)
     corners = points[faces]
     volume = np.einsum("fi,fi->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2])
     return points, faces if volume > 0 else faces[:, ::-1]
 
 
-def _distance(points: np.ndarray) -> np.ndarray:
-    """Smooth union of the parts: negative inside."""
+def _distance(axes: list[np.ndarray]) -> np.ndarray:
+    """Smooth union of the parts on a grid, negative inside; each part counts where it is near."""
     names = [*_BONES, *(f"r_{name[2:]}" for name in _BONES if name.startswith("l_"))]
-    total = np.zeros(points.shape[:-1])
+    total = np.full([len(axis) for axis in axes], np.exp(-_REACH_M / _BLEND_M))
     for name in names:
         left = f"l_{name[2:]}" if name.startswith("r_") else name
         start, end, radius = _BONES[left]
         ends = [f"r_{e[2:]}" if name.startswith("r_") else e for e in (start, end)]
-        gap = _to_segment(points, _place(ends[0]), _place(ends[1])) - radius
-        total += np.exp(-np.clip(gap, -0.3, 1) / _BLEND_M)
+        start, end = _place(ends[0]), _place(ends[1])
+        reach = radius + _REACH_M
+        window = tuple(
+            slice(*np.searchsorted(axis, [min(a, b) - reach, max(a, b) + reach]))
+            for axis, a, b in zip(axes, start, end, strict=True)
+        )
+        near = [axis[part] for axis, part in zip(axes, window, strict=True)]
+        points = np.stack(np.meshgrid(*near, indexing="ij"), axis=-1)
+        total[window] += np.exp((radius - _to_segment(points, start, end)) / _BLEND_M)
     return -_BLEND_M * np.log(total)
 
 

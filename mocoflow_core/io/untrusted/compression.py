@@ -8,7 +8,6 @@ import zlib
 from collections.abc import Callable
 from typing import Protocol
 
-from mocoflow_core.errors import InputError
 from mocoflow_core.io.untrusted.byte_stream import ByteStream
 from mocoflow_core.io.untrusted.limits import Allowance
 from mocoflow_core.io.untrusted.refusal import damaged
@@ -73,7 +72,6 @@ def unpacked(stream: ByteStream, start: bytes, allowance: Allowance) -> ByteStre
         InputError: it grows beyond the limits, is damaged or cut short.
     """
     unpacker = next(make for magic, make in _UNPACKERS.items() if start.startswith(magic))()
-    limit = allowance.growth_limit(stream.size)
     content = bytearray()
     while not unpacker.eof:
         packed = stream.take(min(_CHUNK, stream.remaining))
@@ -81,11 +79,6 @@ def unpacked(stream: ByteStream, start: bytes, allowance: Allowance) -> ByteStre
         if not piece and not packed and not unpacker.eof:
             raise damaged("a compressed file that ends too early")
         content += piece
-        if len(content) > limit:
-            raise InputError(
-                "it must unpack to a sensible size",
-                f"{stream.size:,} bytes that grow beyond {limit:,}",
-                "Get the file from its maker again.",
-            )
-    allowance.spend_bytes(len(content))
+        allowance.spend_bytes(len(piece))
+        allowance.require_growth(stream.size, len(content))
     return ByteStream.over(bytes(content))

@@ -49,11 +49,16 @@ def main(source: BinaryIO, target: BinaryIO) -> None:
 
 
 def _bound(request: dict[str, Any]) -> None:
-    memory = request["bytes"] + OVERHEAD_BYTES
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CPU, (request["seconds"], request["seconds"]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    bounds = {
+        resource.RLIMIT_AS: request["bytes"] + OVERHEAD_BYTES,
+        resource.RLIMIT_CPU: request["seconds"],
+        resource.RLIMIT_FSIZE: 0,
+        resource.RLIMIT_CORE: 0,
+    }
+    for kind, bound in bounds.items():
+        outer = resource.getrlimit(kind)[1]
+        lower = bound if outer == resource.RLIM_INFINITY else min(bound, outer)
+        resource.setrlimit(kind, (lower, lower))
 
 
 def _datasets(file: h5py.File, members: int) -> Iterator[tuple[str, h5py.Dataset]]:

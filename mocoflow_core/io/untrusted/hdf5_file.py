@@ -118,6 +118,8 @@ def _described(answers: BinaryIO, allowance: Allowance) -> tuple[str, ArrayShape
     if not line:
         return None
     answer = json.loads(line)
+    if not isinstance(answer, dict):
+        raise damaged("an HDF5 file that cannot be read to its end")
     if "refused" in answer:
         required, found, action = answer["refused"]
         raise InputError(str(required), str(found), str(action))

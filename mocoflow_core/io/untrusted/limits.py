@@ -23,6 +23,19 @@ class Limits:
     seconds: int = 120  # of computing in the HDF5 library
 
 
+class OwnBytes:
+    """Bytes that lie in a file and may be used once for nothing; what is used again costs."""
+
+    def __init__(self, count: int) -> None:
+        self._left = count
+
+    def beyond(self, count: int) -> int:
+        """How many of the next ``count`` bytes are not the file's own any more."""
+        own = min(count, self._left)
+        self._left -= own
+        return count - own
+
+
 class Allowance:
     """What is left of the limits while one file is read, whatever is nested in it."""
 
@@ -47,10 +60,15 @@ class Allowance:
         if self._steps < 0:
             raise too_many_items(self.limits)
 
-    def growth_limit(self, packed_bytes: int) -> int:
-        """How many bytes a packed file of this size may hold."""
-        growing = max(self.limits.free_growth_bytes, packed_bytes * self.limits.growth)
-        return min(growing, self._bytes)
+    def require_growth(self, packed_bytes: int, bytes_so_far: int) -> None:
+        """Raise InputError once a packed file of this size grows more than data does."""
+        limit = max(self.limits.free_growth_bytes, packed_bytes * self.limits.growth)
+        if bytes_so_far > limit:
+            raise InputError(
+                "it must unpack to a sensible size",
+                f"{packed_bytes:,} bytes that grow beyond {limit:,}",
+                "Get the file from its maker again.",
+            )
 
 
 def too_many_items(limits: Limits) -> InputError:

@@ -17,14 +17,12 @@ FETCH_AGAIN = "Copy or download the file again."
 # What parsers of damaged bytes raise: ours, and those of the standard library.
 _DAMAGE = (
     ArithmeticError,
-    AttributeError,
     EOFError,
     LookupError,
     NotImplementedError,
     OSError,
     RecursionError,
     RuntimeError,
-    TypeError,
     ValueError,
     lzma.LZMAError,
     struct.error,
@@ -46,6 +44,8 @@ def naming(path: Path) -> Iterator[None]:
     except InputError as error:
         required = error.required.removeprefix("it ")
         raise InputError(f"{path} {required}", error.got, error.action) from error
+    except PermissionError as error:
+        raise InputError(f"{path} must be readable", str(error), "Give yourself access.") from error
     except MemoryError as error:
         raise InputError(
             f"{path} must fit into memory", "a file that does not", "Free memory or cut the file."

@@ -3,8 +3,9 @@
 Why not ``pickle.Unpickler`` with a ``find_class`` of our own: joblib puts raw bytes between the
 instructions, which the C machine cannot hand over; a single instruction makes it reserve gigabytes
 (LONG_BINPUT, BYTEARRAY8); and REDUCE and BUILD still call into NumPy with whatever the file says.
-This machine is about as fast as the one in Python of the standard library, which is enough: the
-bulk of every file is arrays, and those are one instruction each.
+This machine takes some 1.5 microseconds an instruction, twice as long as the standard library's
+own in Python and thirty times as long as the one in C. That is enough: the bulk of every file is
+arrays, and those are one instruction each.
 
 Source: CPython, ``Lib/pickletools.py``, protocols 0 to 5.
 """
@@ -59,9 +60,14 @@ class PickleMachine:
             if literal is not None:
                 self._stack.append(literal(self._stream))
             elif code == b".":
-                return self._stack.pop()
+                return self._result()
             else:
                 self._follow(code)
+
+    def _result(self) -> object:
+        if not self._stack:
+            raise damaged("a pickle without a result")
+        return self._stack.pop()
 
     def nested(self, stream: ByteStream, outside: Outside | None) -> object:
         """What a pickle within this one holds, under the same allowance."""
@@ -71,7 +77,10 @@ class PickleMachine:
         instruction = _INSTRUCTIONS.get(code)
         if instruction is None:
             raise damaged(f"an unknown pickle instruction {code!r}")
-        instruction(self)
+        try:
+            instruction(self)
+        except (IndexError, KeyError) as error:
+            raise damaged("a pickle whose instructions refer to nothing") from error
 
     # Stack and memo
 

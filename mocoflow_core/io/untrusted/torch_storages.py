@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.io.untrusted.byte_stream import ByteStream
-from mocoflow_core.io.untrusted.limits import Allowance
+from mocoflow_core.io.untrusted.limits import Allowance, OwnBytes
 from mocoflow_core.io.untrusted.records import Admitted, Record, integers
 from mocoflow_core.io.untrusted.refusal import damaged
 
@@ -38,6 +38,10 @@ class Storage(Record):
     code: str
     count: int
     data: bytes | None = None
+    own: OwnBytes = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.own = OwnBytes(self.nbytes)
 
     @property
     def stored(self) -> np.dtype:

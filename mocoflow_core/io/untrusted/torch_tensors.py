@@ -47,8 +47,8 @@ class TensorRecord(Record):
         last = self._offset + sum((n - 1) * step for n, step in steps)
         if last >= len(flat):
             raise damaged(f"a tensor of size {self._size} beyond its storage of {len(flat)}")
-        # A stride of zero repeats one number: the copy may be larger than the file.
-        allowance.spend_bytes(math.prod(self._size) * 4 * flat.itemsize)
+        # A stride of zero repeats one number: the copies may be larger than the storage.
+        allowance.spend_bytes(self._storage.own.beyond(math.prod(self._size) * flat.itemsize))
         strides = tuple(step * flat.itemsize for step in self._stride)
         view = np.lib.stride_tricks.as_strided(
             flat[self._offset :], self._size, strides, writeable=False

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.untrusted.limits import Allowance
+from mocoflow_core.io.untrusted.limits import Allowance, OwnBytes
 from mocoflow_core.io.untrusted.refusal import damaged
 
 _ENCRYPTED = 0x1
@@ -20,9 +20,11 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 class ZipArchive:
     """An open archive whose directory has been checked; nothing is ever unpacked to a disk."""
 
-    def __init__(self, archive: zipfile.ZipFile, allowance: Allowance) -> None:
+    def __init__(self, archive: zipfile.ZipFile, size: int, allowance: Allowance) -> None:
         self._archive = archive
         self._allowance = allowance
+        self._size = size
+        self._own = OwnBytes(size)
         members = archive.infolist()
         if len(members) > allowance.limits.members:
             raise damaged(f"an archive of {len(members):,} entries")
@@ -45,15 +47,9 @@ class ZipArchive:
         member = self._members.get(name)
         if member is None:
             raise damaged(f"an archive without {name[:120]!r}")
-        limit = self._allowance.growth_limit(member.compress_size)
-        self._allowance.spend_bytes(member.file_size)
-        if member.file_size > limit:
-            raise InputError(
-                "it must unpack to a sensible size",
-                f"{name[:80]}, which grows from {member.compress_size:,} to "
-                f"{member.file_size:,} bytes",
-                "Get the file from its maker again.",
-            )
+        packed = min(member.compress_size, self._size)
+        self._allowance.require_growth(packed, member.file_size)
+        self._allowance.spend_bytes(self._own.beyond(member.file_size))
         with self._archive.open(member) as file:
             # One byte more, to meet a member that is longer than it says.
             data = file.read(member.file_size + 1)
@@ -67,7 +63,7 @@ def open_zip(path: Path, allowance: Allowance) -> Iterator[ZipArchive]:
     """The archive at ``path``, or InputError where an entry is not what a data file needs."""
     file: BinaryIO
     with path.open("rb") as file, zipfile.ZipFile(file) as archive:
-        yield ZipArchive(archive, allowance)
+        yield ZipArchive(archive, file.seek(0, 2), allowance)
 
 
 def _require_plain(member: zipfile.ZipInfo) -> None:

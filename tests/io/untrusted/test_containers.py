@@ -8,6 +8,7 @@ import h5py
 import joblib
 import numpy as np
 import pytest
+import scipy.sparse
 import torch
 
 from mocoflow_core.errors import InputError
@@ -145,6 +146,14 @@ def test_a_chumpy_expression_without_an_array_is_what_it_holds(tmp_path):
     (tmp_path / "file").write_bytes(python2_pickle(content))
 
     assert same(read_untrusted(tmp_path / "file"), {"J": {"a": np.ones(2), "idxs": [0]}})
+
+
+@pytest.mark.parametrize("protocol", [2, 5])
+def test_sparse_matrices_of_the_scipy_that_is_installed(tmp_path, protocol):
+    dense = np.array([[0.0, 1, 0], [2, 0, 3]])
+    (tmp_path / "file").write_bytes(pickle.dumps(scipy.sparse.csc_matrix(dense), protocol))
+
+    assert same(read_untrusted(tmp_path / "file"), dense)
 
 
 def test_shared_parts_are_read_once_and_stay_equal(tmp_path):
