@@ -64,11 +64,14 @@ def prepare(request: Request) -> Preparation:
     )
     turned = given if chosen.capture.least_shown > 0 else None
     clip = extract_clip(where, request.recording, chosen.capture, needs, turned)
-    bodies = given
+    located = None
     if inspection.holds("location_search"):
-        bodies = locate_body(where, clip, given, chosen.location)
+        located = locate_body(where, clip, given, chosen.location)
+    bodies = located or given
     repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
-    plan = plan_scene(where, clip, repaired, inspection, chosen.plan, chosen.representation)
+    plan = plan_scene(
+        where, clip, repaired, inspection, chosen.plan, chosen.representation, located
+    )
     start = _start_networks if chosen.representation == "networks" else _start_hybrid
     density, motion = start(request, clip, repaired, plan)
     return Preparation(given, inspection, clip, bodies, repaired, plan, density, motion)

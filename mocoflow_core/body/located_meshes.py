@@ -23,6 +23,17 @@ class LocatedMeshes:
     confidence: Array  # (T,) 0 where the location is interpolated
     warnings: tuple[str, ...]
 
+    @property
+    def quality(self) -> dict[str, float]:
+        """Median residual, median and least confidence over the frames that were searched."""
+        searched = np.isfinite(self.residual)
+        sure = self.confidence[searched]
+        return {
+            "residual": float(np.median(self.residual[searched])),
+            "confidence": float(np.median(sure)),
+            "least_confidence": float(sure.min()),
+        }
+
     def save(self, folder: Path) -> None:
         """Write ``meshes.npz`` and ``location.npz`` into an existing folder."""
         self.meshes.save(folder / "meshes.npz")

@@ -19,7 +19,7 @@ from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.body.located_meshes import LocatedMeshes
 from mocoflow_core.body.mask_crop import NEAR_M, MaskCrop, facing
 from mocoflow_core.body.outline_fit import fit_outline
-from mocoflow_core.body.smooth_path import robust_path
+from mocoflow_core.body.robust_path import robust_path
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.strange_frames import listed
 from mocoflow_core.configuration import ConfigurationPart

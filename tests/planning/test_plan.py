@@ -14,6 +14,7 @@ from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.planning.configuration import PlanConfig
+from mocoflow_core.planning.decision import with_evidence
 from mocoflow_core.planning.inspection import inspect_scene
 from mocoflow_core.planning.plan import ScenePlan, plan_scene
 from mocoflow_core.planning.preparation import (
@@ -295,3 +296,11 @@ def test_shadow_removal_is_what_the_configuration_says_with_what_was_measured():
     assert kept.evidence == plate.evidence == {"shadowed": 0.4}
     assert "capture.behind_person=plate removes them" in kept.reason
     assert "shadow" not in faint.reason
+
+
+def test_what_a_search_measured_stands_beside_the_decision_to_search(folder):
+    inspection = inspect_scene(open_scene(folder), None)
+    before = decide_preparation(inspection, PlanConfig())
+    after = with_evidence(before, "location_search", {"residual": 0.1})
+    assert [b != a for b, a in zip(before, after, strict=True)] == [False, False, True]
+    assert after[-1].evidence["residual"] == 0.1
