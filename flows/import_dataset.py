@@ -21,19 +21,13 @@ def import_dataset(
     ] = None,
 ) -> None:
     """Make a scene folder of a data set: People-Snapshot, ZJU-MoCap or AIST."""
-    from flows.imported_scene import tell
-    from flows.user_folders import body_models_folder
+    from flows.imported_scene import choices, tell
     from mocoflow_core.datasets.detect import kind_of
-    from mocoflow_core.datasets.import_dataset import configure
     from mocoflow_core.datasets.import_dataset import import_dataset as import_into
     from tasks.terminal_bar import terminal_bar
 
     known = kind_of(kind, source)
-    models = body_models_folder()
-    takes_model = "body_model" in known.configuration.model_fields
-    if body_model is None and takes_model and models.is_dir():
-        body_model = models
-    configuration = configure(known, settings or (), body_model)
+    configuration = choices(known, settings or (), body_model)
     with terminal_bar(f"import {source.resolve().name}") as progress:
         imported = import_into(known, source, configuration, out, progress)
     tell(imported)

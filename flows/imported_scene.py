@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from shutil import rmtree
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
 
 
 @lru_cache(maxsize=64)
-def scene_folder(path: Path, without_bodies: bool) -> Path:
+def scene_folder(path: Path, without_bodies: bool, body_model: Path | None = None) -> Path:
     """The path itself, or the scene folder of the data set that lies there.
 
     Args:
         without_bodies: those of the data set are not needed.
+        body_model: file or folder; by default the user's folder of them.
 
     The data set is read by its defaults and imported once for the same files (their names, sizes
     and times), the same configuration and version. Raises InputError as the import does.
@@ -36,7 +38,7 @@ def scene_folder(path: Path, without_bodies: bool) -> Path:
     from mocoflow_core.datasets.detect import detect_kind
 
     kind = detect_kind(path)
-    configuration = _defaults(kind, without_bodies)
+    configuration = _defaults(kind, without_bodies, body_model)
     folder = (
         cache_folder() / "datasets" / f"{path.resolve().name}-{import_key(path, configuration)}"
     )
@@ -48,31 +50,42 @@ def scene_folder(path: Path, without_bodies: bool) -> Path:
         with full_disk_is_bad_input(f"The folder {folder.parent}"):
             tell(_import(kind, path, configuration, folder))
     except InputError as error:
-        choices = f"mocoflow import {kind.name} {path} --set FIELD=VALUE --out DIR"
-        action = f"{error.action} Every choice: {choices}."
+        command = f"mocoflow import {kind.name} {path} --set FIELD=VALUE --out DIR"
+        action = f"{error.action} Every choice: {command}."
         raise InputError(error.required, error.got, action) from error
     return folder
 
 
 def tell(imported: ImportedDataset) -> None:
-    """Print what was assumed and measured, and what is unusual, on stderr."""
+    """Print what was assumed, measured of the train camera, and unusual, on stderr."""
     for remark in imported.remarks:
         typer.echo(f"  {remark}", err=True)
-    measured = ", ".join(f"{name} {value:.4g}" for name, value in imported.measured.items())
+    measured = ", ".join(f"{name} {value:.4g}" for name, value in imported.of_train_camera.items())
     typer.echo(f"  measured: {measured}", err=True)
     for warning in imported.warnings:
         typer.echo(f"  warning: {warning}", err=True)
 
 
-def _defaults(kind: DatasetKind, without_bodies: bool) -> ConfigurationPart:
+def choices(
+    kind: DatasetKind, settings: Sequence[str], body_model: Path | None
+) -> ConfigurationPart:
+    """A configuration with settings applied, its body models the user's where none are given."""
     from mocoflow_core.datasets.import_dataset import configure
 
-    fields = kind.configuration.model_fields
-    if without_bodies and "bodies" in fields:
+    takes_model = "body_model" in kind.configuration.model_fields
+    if body_model is None and takes_model and body_models_folder().is_dir():
+        body_model = body_models_folder()
+    return configure(kind, settings, body_model)
+
+
+def _defaults(
+    kind: DatasetKind, without_bodies: bool, body_model: Path | None
+) -> ConfigurationPart:
+    from mocoflow_core.datasets.import_dataset import configure
+
+    if without_bodies and "bodies" in kind.configuration.model_fields:
         return configure(kind, ("bodies=none",), None)
-    models = body_models_folder()
-    takes_model = "body_model" in fields and models.is_dir()
-    return configure(kind, (), models if takes_model else None)
+    return choices(kind, (), body_model)
 
 
 def _import(

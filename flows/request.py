@@ -51,8 +51,9 @@ class Request(BaseModel):
 
     @cached_property
     def scene(self) -> Scene:
-        folder = scene_folder(self.scene_path, without_bodies=self.meshes is not None)
-        return open_scene(folder, self.configuration.capture.train_camera)
+        chosen = self.configuration
+        folder = scene_folder(self.scene_path, self.meshes is not None, chosen.meshes.body_model)
+        return open_scene(folder, chosen.capture.train_camera)
 
     @cached_property
     def configuration(self) -> Configuration:

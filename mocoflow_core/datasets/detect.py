@@ -40,10 +40,11 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
             "a folder of one data set", f"one of {names}", "Name the kind: mocoflow import KIND."
         )
     if subjects := _subjects(folder, kinds):
-        listed = ", ".join(subjects[:_NAMED_SUBJECTS])
+        more = ", ..." if len(subjects) > _NAMED_SUBJECTS else ""
+        listed = ", ".join(subjects[:_NAMED_SUBJECTS]) + more
         raise InputError(
             "the folder of one subject",
-            f"{folder} with {len(subjects)} of them ({listed}{', ...' * (len(subjects) > 5)})",
+            f"{folder} with {len(subjects)} of them ({listed})",
             f"Name one, as {folder / subjects[0]}.",
         )
     nearest = sorted(missing, key=lambda name: len(missing[name]))
@@ -52,13 +53,6 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
         "a folder with a scene.json or of a known data set",
         f"{folder}, which is none",
         f"To be one it would need: {lacks}.",
-    )
-
-
-def looks_like_dataset(folder: Path) -> bool:
-    """Whether a folder is of exactly one kind, or holds such folders."""
-    return folder.is_dir() and (
-        any(not kind.missing(folder) for kind in KINDS.values()) or bool(_subjects(folder, KINDS))
     )
 
 

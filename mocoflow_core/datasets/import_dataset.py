@@ -23,9 +23,19 @@ class ImportedDataset:
     """What was assumed, measured and found unusual, in words and numbers."""
 
     name: str
+    train_camera: str
     remarks: tuple[str, ...]
     measured: dict[str, float]
     warnings: tuple[str, ...]
+
+    @property
+    def of_train_camera(self) -> dict[str, float]:
+        """What was measured of the scene as a whole and of the camera that is learned from."""
+        return {
+            name: value
+            for name, value in self.measured.items()
+            if " of " not in name or name.endswith(f" of {self.train_camera}")
+        }
 
 
 def configure(
@@ -56,7 +66,9 @@ def import_dataset(
     require_new(out)
     scene = kind.read(source, configuration)
     findings = check_dataset(scene)
-    imported = ImportedDataset(scene.name, scene.remarks, findings.measured, findings.warnings)
+    imported = ImportedDataset(
+        scene.name, scene.train_camera, scene.remarks, findings.measured, findings.warnings
+    )
     record = {
         "kind": kind.name,
         "source": str(source.resolve()),

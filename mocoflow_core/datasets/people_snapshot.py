@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,13 +12,11 @@ from pydantic import Field
 
 from mocoflow_core.capture.frame_source import VideoFrames
 from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.datasets import snapshot_files as files
 from mocoflow_core.datasets.chosen_frames import WHITE, ChosenFrames, FramesOnWhite
 from mocoflow_core.datasets.dataset_scene import (
     DatasetCamera,
     DatasetMeshes,
     DatasetScene,
-    MaskSource,
 )
 from mocoflow_core.datasets.hdf5_masks import Hdf5Masks
 from mocoflow_core.datasets.mask_sources import ChosenMasks, ErodedMasks
@@ -26,9 +24,18 @@ from mocoflow_core.datasets.pose_alignment import PoseAlignment, align_poses
 from mocoflow_core.datasets.sampled_masks import sample_masks
 from mocoflow_core.datasets.snapshot_bodies import BodyShape, SnapshotGender, open_bodies
 from mocoflow_core.datasets.snapshot_clips import choose_clip
+from mocoflow_core.datasets.snapshot_files import (
+    SnapshotPaths,
+    TrackedBody,
+    count_keypoints,
+    find_paths,
+    read_camera,
+    read_consensus_body,
+    read_tracked_body,
+)
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.io.video import DecodedVideo, decode_to_the_end
+from mocoflow_core.io.video import decode_to_the_end
 
 Indices = NDArray[np.int32]
 CAMERA = "camera"
@@ -91,146 +98,143 @@ def read_people_snapshot(
     Raises InputError for missing or damaged files, sizes that disagree with ``camera.pkl``, counts
     that differ by more than ``most_surplus``, and a missing body model.
     """
-    subject = folder.resolve().name
-    paths = files.find_paths(folder)
-    camera, moved = _as_world(files.read_camera(paths.camera, CAMERA))
-    video = decode_to_the_end(paths.video)
-    _require_size(video.width, video.height, camera, paths.video.name)
-    masks = Hdf5Masks(paths.masks)
-    _require_size(masks.shape[2], masks.shape[1], camera, files.MASKS_FILE)
-    tracked = files.read_tracked_body(paths.poses)
-    usable, remarks = _usable(video, masks, len(tracked.pose), paths, configuration)
-    numbers, origin = choose_clip(subject, configuration.first_frame, configuration.frames, usable)
-    remarks += [origin, *moved]
-    shrunk: MaskSource = masks
-    if configuration.mask_erosion_px > 1:
-        shrunk = ErodedMasks(masks, configuration.mask_erosion_px)
-        remarks.append(f"masks are eroded by {configuration.mask_erosion_px} px")
+    subject = _open(folder)
+    usable, remarks = _usable(subject, configuration.most_surplus)
+    numbers, origin = choose_clip(
+        subject.name, configuration.first_frame, configuration.frames, usable
+    )
+    remarks += [origin, *subject.remarks]
     meshes = None
     if configuration.bodies == "posed":
-        numbers, meshes, said = _meshes(
-            subject, paths, tracked, camera, masks, numbers, configuration
-        )
+        meshes, said = _posed(subject, numbers, configuration)
+        numbers = meshes.sequence.frame_indices
         remarks += said
     else:
         remarks.append("bodies are left out: give an estimate with --meshes")
-    source = VideoFrames(paths.video)
-    fps = _rate(source)
-    recorded = _recorded(camera, source, ChosenMasks(shrunk, numbers), numbers, configuration)
-    remarks.append(
-        f"one frame in {configuration.stride} is learned from: {fps:g} / {configuration.stride} = "
-        f"{fps / configuration.stride:g} per second; frames between may be held out"
-    )
+    fps, working_fps, rate = _rates(subject, configuration.stride)
     return DatasetScene(
-        name=subject,
+        name=subject.name,
         fps=fps,
         up="-y",
         train_camera=CAMERA,
-        cameras={CAMERA: recorded},
+        cameras={CAMERA: _recorded(subject, numbers, configuration)},
         meshes=meshes,
         truth=None,
         license=LICENSE,
         attribution=ATTRIBUTION,
-        remarks=tuple(remarks),
-        working_fps=fps / configuration.stride,
+        remarks=(*remarks, rate),
+        working_fps=working_fps,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Subject:
+    """One subject's files, opened and found to belong together."""
+
+    name: str
+    paths: SnapshotPaths
+    camera: Camera  # the world is its axes
+    frame_count: int  # as decoded
+    masks: Hdf5Masks
+    tracked: TrackedBody
+    remarks: tuple[str, ...]
+
+
+def _open(folder: Path) -> _Subject:
+    paths = find_paths(folder)
+    camera, remarks = _as_world(read_camera(paths.camera, CAMERA))
+    video = decode_to_the_end(paths.video)
+    _require_size(video.width, video.height, camera, paths.video.name)
+    masks = Hdf5Masks(paths.masks)
+    _require_size(masks.shape[2], masks.shape[1], camera, paths.masks.name)
+    tracked = read_tracked_body(paths.poses)
+    name = folder.resolve().name
+    return _Subject(name, paths, camera, video.frame_count, masks, tracked, remarks)
+
+
+def _as_world(camera: Camera) -> tuple[Camera, tuple[str, ...]]:
+    """The camera as the world: poses stand in its axes, whatever the file says of it."""
+    apart = max(float(np.abs(camera.R - np.eye(3)).max()), float(np.abs(camera.t).max()))
+    moved = ("camera_rt and camera_t are set to 0: poses have them",) if apart > NO_MOTION else ()
+    return replace(camera, R=np.eye(3), t=np.zeros(3)), moved
 
 
 def _require_size(width: int, height: int, camera: Camera, what: str) -> None:
-    if (width, height) == (camera.width, camera.height):
-        return
-    raise InputError(
-        f"{what} must be {camera.width} x {camera.height} as {files.CAMERA_FILE} says",
-        f"{width} x {height}",
-        "It was turned, cropped or resized since: undo that, for example with ffmpeg's filters "
-        "transpose and crop.",
-    )
-
-
-def _usable(
-    video: DecodedVideo,
-    masks: Hdf5Masks,
-    poses: int,
-    paths: files.SnapshotPaths,
-    configuration: PeopleSnapshotConfig,
-) -> tuple[int, list[str]]:
-    """How many frames have a mask, counted from the first; and a remark on all the counts."""
-    counts = {"frames": video.frame_count, "masks": masks.shape[0], "poses": poses}
-    usable = min(video.frame_count, masks.shape[0])
-    said = ", ".join(f"{count} {what}" for what, count in counts.items())
-    if max(counts.values()) - min(counts.values()) > configuration.most_surplus:
+    if (width, height) != (camera.width, camera.height):
         raise InputError(
-            f"as many frames, masks and poses, up to {configuration.most_surplus}",
+            f"{what} must be {camera.width} x {camera.height} as camera.pkl says",
+            f"{width} x {height}",
+            "It was turned, cropped or resized since: undo that, for example with ffmpeg's "
+            "filters transpose and crop.",
+        )
+
+
+def _usable(subject: _Subject, most_surplus: int) -> tuple[int, list[str]]:
+    """How many frames have a mask, counted from the first; and remarks on all the counts."""
+    frames, masks, poses = subject.frame_count, subject.masks.shape[0], len(subject.tracked.pose)
+    said = f"{frames} frames, {masks} masks, {poses} poses"
+    if max(frames, masks, poses) - min(frames, masks, poses) > most_surplus:
+        raise InputError(
+            f"as many frames, masks and poses, up to {most_surplus}",
             said,
             "Take the files as they were distributed, or allow more with most_surplus.",
         )
-    if paths.keypoints:
-        said += f", {files.count_keypoints(paths.keypoints)} keypoints (not used)"
-    remarks = [said]
-    if video.frame_count != masks.shape[0]:
-        remarks.append(f"frames and masks are joined from the first: {usable} are used")
-    return usable, remarks
+    if subject.paths.keypoints:
+        said += f", {count_keypoints(subject.paths.keypoints)} keypoints (not used)"
+    usable = min(frames, masks)
+    joined = f"frames and masks are joined from the first: {usable} are used"
+    return usable, [said] if frames == masks else [said, joined]
 
 
-def _as_world(camera: Camera) -> tuple[Camera, list[str]]:
-    """The camera as the world: poses stand in its axes, whatever the file says of it."""
-    apart = max(float(np.abs(camera.R - np.eye(3)).max()), float(np.abs(camera.t).max()))
-    remarks = [] if apart < NO_MOTION else ["camera_rt and camera_t are set to 0: poses have them"]
-    return replace(camera, R=np.eye(3), t=np.zeros(3)), remarks
-
-
-def _meshes(
-    subject: str,
-    paths: files.SnapshotPaths,
-    tracked: files.TrackedBody,
-    camera: Camera,
-    masks: Hdf5Masks,
-    numbers: Indices,
-    configuration: PeopleSnapshotConfig,
-) -> tuple[Indices, DatasetMeshes, list[str]]:
-    """The frames that have a pose, their bodies, and remarks."""
-    consensus = files.read_consensus_body(paths.consensus) if paths.consensus else None
+def _posed(
+    subject: _Subject, numbers: Indices, configuration: PeopleSnapshotConfig
+) -> tuple[DatasetMeshes, list[str]]:
+    """The bodies of those frames that have a pose, and remarks."""
+    consensus, poses = subject.paths.consensus, len(subject.tracked.pose)
     bodies, remarks = open_bodies(
-        subject,
-        tracked,
-        consensus,
+        subject.name,
+        subject.tracked,
+        read_consensus_body(consensus) if consensus else None,
         configuration.body_model,
         configuration.gender,
         configuration.body_shape,
     )
-    surplus = len(tracked.pose) - masks.shape[0]
-    sampled = sample_masks(camera, masks, numbers)
+    surplus = poses - subject.masks.shape[0]
+    sampled = sample_masks(subject.camera, subject.masks, numbers)
     aligned = align_poses(configuration.pose_alignment, surplus, sampled, bodies.pose)
     remarks.append(aligned.remark)
     rows = numbers + np.int32(aligned.shift)
-    posed = (rows >= 0) & (rows < len(tracked.pose))
-    if not posed.all():
-        remarks.append(f"{(~posed).sum()} frames at the end have no pose and are left out")
-    sequence = replace(bodies.pose(rows[posed]), frame_indices=numbers[posed])
+    there = (rows >= 0) & (rows < poses)
+    if not there.all():
+        remarks.append(f"{(~there).sum()} frames at the end have no pose and are left out")
+    sequence = replace(bodies.pose(rows[there]), frame_indices=numbers[there])
     source = f"People-Snapshot reconstructed poses, {configuration.body_shape} shape"
-    return numbers[posed], DatasetMeshes(sequence, "world", True, source), remarks
+    return DatasetMeshes(sequence, "world", True, source), remarks
 
 
-def _rate(source: VideoFrames) -> float:
-    """Frames per second as the container says."""
-    fps = source.fps
+def _rates(subject: _Subject, stride: int) -> tuple[float, float, str]:
+    """Frames per second as the container says, those to learn from, and a remark."""
+    fps = VideoFrames(subject.paths.video).fps
     if not fps:
         raise InputError(
             "a video that states its rate",
             "none",
             "Write it again with its rate, for example with ffmpeg -r 24.",
         )
-    return fps
+    return (
+        fps,
+        fps / stride,
+        f"one frame in {stride} is learned from: {fps:g} / {stride} = {fps / stride:g} per "
+        "second; frames between may be held out",
+    )
 
 
 def _recorded(
-    camera: Camera,
-    source: VideoFrames,
-    masks: MaskSource,
-    numbers: Indices,
-    configuration: PeopleSnapshotConfig,
+    subject: _Subject, numbers: Indices, configuration: PeopleSnapshotConfig
 ) -> DatasetCamera:
-    frames = ChosenFrames(source, numbers)
+    camera, side_px = subject.camera, configuration.mask_erosion_px
+    masks = ChosenMasks(ErodedMasks(subject.masks, side_px) if side_px else subject.masks, numbers)
+    frames = ChosenFrames(VideoFrames(subject.paths.video), numbers)
     if configuration.background == "filmed":
         return DatasetCamera(camera, frames, masks)
     plate = np.full((camera.height, camera.width, 3), WHITE, np.uint8)

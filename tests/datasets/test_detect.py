@@ -37,6 +37,21 @@ def test_a_subject_of_people_snapshot_is_recognised(subject):
     assert detect_kind(subject()).name == "people-snapshot"
 
 
+@pytest.mark.parametrize(
+    ("kind", "files"),
+    [
+        ("zju-mocap", ("annots.npy", "Camera_B1/000000.jpg")),
+        ("aist", ("gBR_sBM_c09_d04_mBR0_ch01.mp4", "cameras/mapping.txt")),
+        ("aist", ("videos/gBR_sBM_c09_d04_mBR0_ch01.mp4", "annotations/cameras/mapping.txt")),
+    ],
+)
+def test_the_other_kinds_are_recognised(tmp_path, kind, files):
+    for name in files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert detect_kind(tmp_path).name == kind
+
+
 def test_what_is_missing_is_named_for_every_kind_the_nearest_first(subject):
     told = refusal(subject(without=("masks.hdf5",)))
     assert "people-snapshot lacks masks.hdf5" in told

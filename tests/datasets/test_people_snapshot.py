@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
@@ -15,6 +14,7 @@ from mocoflow_core.datasets.dataset_checks import check_dataset
 from mocoflow_core.datasets.people_snapshot import PeopleSnapshotConfig, read_people_snapshot
 from mocoflow_core.datasets.write_dataset import write_dataset
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.ingest import ingest_meshes
 from tests.datasets.snapshot_layout import turning, write_snapshot
 from tests.lossless_video import write_lossless
 from tests.small_smpl import write_smpl

@@ -9,6 +9,7 @@ import pytest
 
 from flows.command_line import main
 from flows.imported_scene import import_key, scene_folder
+from flows.request import Request
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.datasets.detect import detect_kind
 from mocoflow_core.datasets.import_dataset import configure
@@ -90,11 +91,24 @@ def test_a_changed_file_or_choice_is_another_import(subject):
     assert len(keys) == 3
 
 
-def test_with_meshes_from_elsewhere_no_body_model_is_needed(subject, monkeypatch, tmp_path):
+def test_a_missing_body_model_is_named_with_the_command_for_every_choice(
+    subject, monkeypatch, tmp_path
+):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     with pytest.raises(InputError, match=r"--body-model.*mocoflow import people-snapshot"):
         scene_folder(subject, without_bodies=False)
+
+
+def test_meshes_from_elsewhere_need_no_body_model(subject, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     assert open_scene(scene_folder(subject, without_bodies=True)).meshes() is None
+
+
+def test_the_body_model_of_the_command_line_is_the_data_sets_too(subject, data, monkeypatch):
+    monkeypatch.setenv("XDG_DATA_HOME", str(data / "elsewhere"))
+    model = data / "mocoflow" / "body_models" / "SMPL_FEMALE.pkl"
+    request = Request(scene_path=subject, settings=(f"meshes.body_model={model}",))
+    assert request.scene.meshes() is not None
 
 
 def test_a_scene_is_what_it_is(toy_scene):
