@@ -80,8 +80,9 @@ def test_pictures_stay_as_filmed_where_that_is_asked_for(read, tmp_path):
         ZjuLayout(keypoints=True),
         ZjuLayout(annotations="annots_python2.npy"),
         ZjuLayout(annotations="annots_python2.npy", nested_lists=True, keypoints=True),
+        ZjuLayout(annotations="annots.json"),
     ],
-    ids=["nested lists", "with kpts2d", "python 2", "python 2 with lists"],
+    ids=["nested lists", "with kpts2d", "python 2", "python 2 with lists", "json"],
 )
 def test_variants_of_the_annotations_mean_the_same(read, filmed, layout):
     assert_same_cameras(read(layout), filmed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -84,8 +85,15 @@ def annotations(studio: Studio, paths: dict[str, list[PurePosixPath]], layout: Z
 
 
 def write_annotations(folder: Path, content: dict, name: str = "annots.npy") -> None:
-    """A 0-d object array that holds a dictionary, as NumPy 1 under Python 2 (or 3) pickled it."""
+    """A 0-d object array that holds a dictionary, as NumPy 1 under Python 2 (or 3) pickled it.
+
+    An ending ``.json`` writes nested lists instead.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    if name.endswith(".json"):
+        text = json.dumps(content, default=lambda array: array.tolist())
+        (folder / name).write_text(text)
+        return
     array = np.array(content, dtype=object)
     written = pickle.dumps(array, protocol=2 if "python2" in name else 4)
     with (folder / name).open("wb") as file:

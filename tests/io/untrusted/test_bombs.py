@@ -137,13 +137,13 @@ def test_a_memo_place_far_out_takes_no_memory(tmp_path):
     ],
 )
 def test_compressed_files_that_grow_without_end(refused, pack):
-    refused(pack(bytes(20 * MEGABYTE)), "grow beyond")
+    refused(pack(bytes(6 * MEGABYTE)), "grow beyond")
 
 
 def test_archives_that_grow_without_end(refused):
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("a.npy", bytes(20 * MEGABYTE))
+        archive.writestr("a.npy", bytes(6 * MEGABYTE))
     refused(file.getvalue(), "bytes that grow beyond")
 
 
