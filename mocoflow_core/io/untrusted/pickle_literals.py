@@ -83,6 +83,13 @@ def _unicode_line(stream: ByteStream) -> object:
     return stream.line().decode("raw-unicode-escape")
 
 
+def memo_place(stream: ByteStream, width: int) -> int:
+    """A number of so many bytes, or for width 0 a line of digits."""
+    if width:
+        return int.from_bytes(stream.take(width), "little")
+    return int(_digits(stream))
+
+
 LITERALS: Mapping[bytes, Callable[[ByteStream], object]] = {
     b"N": _constant(None),
     b"\x88": _constant(True),

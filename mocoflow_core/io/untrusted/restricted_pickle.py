@@ -13,18 +13,16 @@ Source: CPython, ``Lib/pickletools.py``, protocols 0 to 5.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from struct import Struct
 
 from mocoflow_core.io.untrusted.admitted_names import admitted, forbidden
 from mocoflow_core.io.untrusted.byte_stream import ByteStream
 from mocoflow_core.io.untrusted.limits import Allowance
-from mocoflow_core.io.untrusted.pickle_literals import LITERALS
+from mocoflow_core.io.untrusted.pickle_literals import LITERALS, memo_place
 from mocoflow_core.io.untrusted.plain_keys import plain_key
 from mocoflow_core.io.untrusted.plain_tree import plain_tree
 from mocoflow_core.io.untrusted.records import Admitted, Outside, Record
 from mocoflow_core.io.untrusted.refusal import damaged
 
-_U4 = Struct("<I")
 _NEWEST_PROTOCOL = 5
 
 
@@ -105,26 +103,17 @@ class PickleMachine:
     def _duplicate(self) -> None:
         self._stack.append(self._stack[-1])
 
-    def _put(self, place: int) -> None:
-        self._memo[place] = self._stack[-1]
+    def _put(self, width: int) -> None:
+        self._memo[memo_place(self._stream, width)] = self._stack[-1]
 
-    def _get(self, place: int) -> None:
-        self._stack.append(self._memo[place])
+    def _get(self, width: int) -> None:
+        self._stack.append(self._memo[memo_place(self._stream, width)])
 
-    def _byte(self) -> int:
-        return self._stream.take(1)[0]
-
-    def _word(self) -> int:
-        return int(_U4.unpack(self._stream.take(4))[0])
-
-    def _number_line(self) -> int:
-        line = self._stream.line()
-        if len(line) > 10:
-            raise damaged("a memo number of many digits")
-        return int(line)
+    def _memoise(self) -> None:
+        self._memo[len(self._memo)] = self._stack[-1]
 
     def _protocol(self) -> None:
-        if self._byte() > _NEWEST_PROTOCOL:
+        if self._stream.take(1)[0] > _NEWEST_PROTOCOL:
             raise damaged("a pickle of an unknown protocol")
 
     def _frame(self) -> None:
@@ -223,13 +212,13 @@ _INSTRUCTIONS: Mapping[bytes, Callable[[PickleMachine], None]] = {
     b"0": PickleMachine._pop,
     b"1": PickleMachine._drop_marked,
     b"2": PickleMachine._duplicate,
-    b"p": lambda m: m._put(m._number_line()),
-    b"q": lambda m: m._put(m._byte()),
-    b"r": lambda m: m._put(m._word()),
-    b"\x94": lambda m: m._put(len(m._memo)),
-    b"g": lambda m: m._get(m._number_line()),
-    b"h": lambda m: m._get(m._byte()),
-    b"j": lambda m: m._get(m._word()),
+    b"p": lambda m: m._put(0),
+    b"q": lambda m: m._put(1),
+    b"r": lambda m: m._put(4),
+    b"\x94": PickleMachine._memoise,
+    b"g": lambda m: m._get(0),
+    b"h": lambda m: m._get(1),
+    b"j": lambda m: m._get(4),
     b"\x85": lambda m: m._tuple(1),
     b"\x86": lambda m: m._tuple(2),
     b"\x87": lambda m: m._tuple(3),
