@@ -53,7 +53,7 @@ def test_another_focal_length_keeps_x_and_y_and_scales_the_depth():
 
 def test_another_camera_keeps_the_pixel_and_the_size_of_the_anchor():
     translations = np.array([[0.3, -0.1, 40.0], [-0.6, 0.2, 55.0]])
-    tool = ToolCamera(np.array([9000.0, 12000.0]), np.array([320.0, 240.0]))
+    tool = ToolCamera(np.array([9000.0, 12000.0]), np.array([300.0, 251.0]))
     found = refocused(translations, ANCHORS, tool, CAMERA) + ANCHORS
     before = translations + ANCHORS
     scale_px = tool.focal_px / before[:, 2]
