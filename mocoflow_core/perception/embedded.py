@@ -15,6 +15,8 @@ from mocoflow_core.perception.graph import Graph, GraphNetwork
 FOLDER = Path(__file__).parent / "weights"
 
 DIGESTS = {
+    "blazepose_detector": "50bc5f510939e11946ed68b9981124dce1496f32ce6b5b382840235266302c3f",
+    "blazepose_landmark_heavy": "aeefef011581cad851eebab57aa360bb5dbe39b17db8907199ba09ae177a5ac7",
     "nanodet": "f3006c9c4c459ecb851225d35b2d63154a3a436859df16812976f763d4eb5a7f",
     "movenet_thunder": "2f07ad075593f5286cae0791044cad469f570b8baedb0dd7319ebec5ca7b19e2",
     "lpips_alex": "9501dadd8d5f780ca26930ff3aa6d003bc7d19ffe5bf598c8a2ee678a176efe4",

@@ -26,7 +26,17 @@ class Node(BaseModel):
 
     name: str
     op: Literal[
-        "convolve", "add", "concatenate", "resize", "max_pool", "leaky_relu", "relu", "relu6"
+        "convolve",
+        "add",
+        "concatenate",
+        "resize",
+        "max_pool",
+        "leaky_relu",
+        "relu",
+        "relu6",
+        "sigmoid",
+        "widen",
+        "depth_to_space",
     ]
     takes: tuple[str, ...]
     kernel: int = 1
@@ -35,6 +45,7 @@ class Node(BaseModel):
     groups: int = 1
     size: tuple[int, int] = (0, 0)  # height and width after ``resize``
     slope: float = 0.0  # of ``leaky_relu``
+    channels: int = 0  # empty ones that ``widen`` adds
 
 
 class Graph(BaseModel):
@@ -47,12 +58,18 @@ class Graph(BaseModel):
 
 
 class GraphNetwork(nn.Module):
-    """Evaluates a graph with the weights ``<node>.weight`` and ``<node>.bias``."""
+    """Evaluates a graph with the weights ``<node>.weight`` and ``<node>.bias``.
+
+    Weights stored as bytes have a ``<node>.scale`` for each channel.
+    """
 
     def __init__(self, graph: Graph, weights: Mapping[str, Tensor]) -> None:
         super().__init__()
         self._graph = graph
-        self._weights = {name: tensor.float() for name, tensor in weights.items()}
+        for name, tensor in weights.items():
+            node, part = name.split(".")
+            scale = weights.get(f"{node}.scale", 1.0) if part == "weight" else 1.0
+            self.register_buffer(f"{node}_{part}", tensor.float() * scale)
         uses = {name: node.name for node in graph.nodes for name in node.takes}
         self._last_use = {name: user for name, user in uses.items() if name not in graph.outputs}
 
@@ -71,8 +88,8 @@ class GraphNetwork(nn.Module):
         first = takes[0]
         match node.op:
             case "convolve":
-                weight = self._weights[f"{node.name}.weight"]
-                bias = self._weights.get(f"{node.name}.bias")
+                weight = getattr(self, f"{node.name}_weight")
+                bias = getattr(self, f"{node.name}_bias", None)
                 padded, padding = _padded(first, node)
                 return F.conv2d(padded, weight, bias, node.stride, padding, groups=node.groups)
             case "add":
@@ -89,6 +106,12 @@ class GraphNetwork(nn.Module):
                 return F.relu(first)
             case "relu6":
                 return F.relu6(first)
+            case "sigmoid":
+                return torch.sigmoid(first)
+            case "widen":
+                return F.pad(first, (0, 0, 0, 0, 0, node.channels))
+            case "depth_to_space":
+                return _depth_to_space(first)
 
 
 def _padded(picture: Tensor, node: Node) -> tuple[Tensor, int]:
@@ -103,3 +126,11 @@ def _padded(picture: Tensor, node: Node) -> tuple[Tensor, int]:
         return picture, missing[0] // 2
     (above, below), (left, right) = ((total // 2, total - total // 2) for total in missing)
     return F.pad(picture, (left, right, above, below)), 0
+
+
+def _depth_to_space(first: Tensor) -> Tensor:
+    """Blocks of 2 x 2 pixels from four groups of channels, row by row."""
+    count, channels, height, width = first.shape
+    blocks = first.reshape(count, 2, 2, channels // 4, height, width)
+    spread = blocks.permute(0, 3, 4, 1, 5, 2)
+    return spread.reshape(count, channels // 4, 2 * height, 2 * width)
