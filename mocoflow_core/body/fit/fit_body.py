@@ -14,7 +14,7 @@ from mocoflow_core.body.fit.fittable_body import LANDMARKS, READINGS, FittableBo
 from mocoflow_core.body.fit.landmark_misfit import LandmarkConfig, PictureMisfit, SpaceMisfit
 from mocoflow_core.body.fit.least_squares import Term, minimise
 from mocoflow_core.body.fit.mask_misfit import MaskConfig, MaskOutlines
-from mocoflow_core.body.fit.posed_body import BodyPose, Mixtures, PosedBody
+from mocoflow_core.body.fit.posed_body import BodyPose, PosedBody
 from mocoflow_core.body.fit.prior import Fact, Prior, PriorConfig
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.body.mesh_sequence import MeshSequence
@@ -155,7 +155,6 @@ def _misfits(
     scale = pose.places[:, 2] / np.sqrt(camera.K[0, 0] * camera.K[1, 1])
     fine = PictureMisfit(
         body,
-        body.regressor,
         sightings,
         camera.K,
         scale,
@@ -165,9 +164,7 @@ def _misfits(
     rough = replace(fine, error_m=4 * landmarks.picture_error_m)
     if sightings.world is None:
         return [rough], [fine]
-    space = SpaceMisfit(
-        body, body.regressor, sightings, landmarks.space_error_m, landmarks.outlier
-    )
+    space = SpaceMisfit(body, sightings, landmarks.space_error_m, landmarks.outlier)
     return [rough, space], [fine, space]
 
 
@@ -199,7 +196,7 @@ def _fitted(
 
 
 def _landmark_px(posed: PosedBody, sightings: Sightings, camera: Camera) -> Array:
-    places = posed.points(Mixtures.of(posed.body, posed.body.regressor, posed.pose.shape))
+    places = posed.points(sightings.points(posed.body, posed.pose.shape))
     projected = places @ camera.K.T
     pixels = projected[..., :2] / np.maximum(projected[..., 2:], 0.1)
     squared = ((pixels - sightings.places) ** 2).sum(-1)

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from mocoflow_core.body.fit.fittable_body import FittableBody
 from mocoflow_core.body.fit.least_squares import System
-from mocoflow_core.body.fit.posed_body import BodyPose, Mixtures, PosedBody
+from mocoflow_core.body.fit.posed_body import BodyPose, PosedBody
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.configuration import ConfigurationPart
 
@@ -33,7 +33,6 @@ class PictureMisfit:
     """Reprojection; pixels are worth metres at the depth the body was first guessed at."""
 
     body: FittableBody
-    regressor: Array  # (21, V)
     sightings: Sightings
     K: Array  # (3, 3)
     scale: Array  # (T,) metres for each pixel
@@ -41,7 +40,7 @@ class PictureMisfit:
     outlier: float
 
     def __call__(self, pose: BodyPose) -> System:
-        points = Mixtures.of(self.body, self.regressor, pose.shape)
+        points = self.sightings.points(self.body, pose.shape)
         places, by_frame, by_shape = PosedBody.of(self.body, pose).derivatives(points)
         pixels, slopes = project(places, self.K)
         trust = np.sqrt(self.sightings.confidence) * self.scale[:, None] / self.error_m
@@ -56,25 +55,25 @@ class SpaceMisfit:
     """Landmarks in space against the body's, both from their own middle, in one common scale."""
 
     body: FittableBody
-    regressor: Array
     sightings: Sightings
     error_m: float
     outlier: float
 
     def __call__(self, pose: BodyPose) -> System:
         assert self.sightings.world is not None
-        points = Mixtures.of(self.body, self.regressor, pose.shape)
+        points = self.sightings.points(self.body, pose.shape)
         derivatives = PosedBody.of(self.body, pose).derivatives(points)
         trust = self.sightings.confidence
         share = trust / np.maximum(trust.sum(1, keepdims=True), 1e-9)
         places, by_frame, by_shape = (_centred(part, share) for part in derivatives)
         seen = _centred(self.sightings.world, share)
-        alike = trust[..., None] * seen
-        size = float((alike * places).sum()) / max(float((alike * seen).sum()), 1e-9)
+        # The body is scaled to what was seen, not the other way: a smaller body is no better.
+        alike = trust[..., None] * places
+        size = float((alike * seen).sum()) / max(float((alike * places).sum()), 1e-9)
         root = np.sqrt(trust)[..., None] / self.error_m
-        off = root * (places - size * seen)
+        off = root * (size * places - seen)
         weight, cost = held_down((off**2).sum(-1), self.outlier)
-        slope = (weight[..., None] * root)[..., None]
+        slope = size * (weight[..., None] * root)[..., None]
         return _stacked(cost, weight[..., None] * off, slope * by_frame, slope * by_shape, pose)
 
 

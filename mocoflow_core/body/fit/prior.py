@@ -30,6 +30,7 @@ class PriorConfig(ConfigurationPart):
     turning_deg_s2: float = Field(1200.0, gt=0, description="The same of the body's rotation.")
     bending_deg_s2: float = Field(2500.0, gt=0, description="The same of the joints.")
     upright_deg: float = Field(25.0, gt=0, description="Usual lean of the hips where up is known.")
+    error_seconds: float = Field(0.3, gt=0, description="How long errors of landmarks stay alike.")
     clothes_m: float = Field(0.015, gt=0, description="Usual standing off of clothes.")
 
 
@@ -124,6 +125,10 @@ class Prior:
             off = self.body.reading(fact.reading, pose.shape) - fact.value
             residuals.append(np.array([off / fact.spread]))
         slopes, off = np.concatenate(rows), np.concatenate(residuals)
+        # Each frame counts in full, although its errors are its neighbours': what is shared by all
+        # frames has to weigh as much more.
+        alike = np.sqrt(min(len(pose.places), self.configuration.error_seconds / self.step_s))
+        slopes, off = max(1.0, alike) * slopes, max(1.0, alike) * off
         nothing = System.nothing(len(pose.places), UNKNOWNS, shapes + parts)
         return System(
             0.5 * float(off @ off),
