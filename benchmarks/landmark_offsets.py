@@ -129,7 +129,8 @@ def offsets(seen: list[Look]) -> Array:
             weight = trust / (1 + (left**2).sum(1) / USUAL_ERROR_M**2)
             turned = np.swapaxes(matrices, 1, 2) * weight[:, None, None]
             found = np.linalg.solve(
-                (turned @ matrices).sum(0) + 1e-6 * np.eye(3), (turned @ off[..., None]).sum(0)[:, 0]
+                (turned @ matrices).sum(0) + 1e-6 * np.eye(3),
+                (turned @ off[..., None]).sum(0)[:, 0],
             )
         for r, m in sides[:2] if twin != row else sides[:1]:
             result[r] = m * found

@@ -127,8 +127,9 @@ class Prior:
         slopes, off = np.concatenate(rows), np.concatenate(residuals)
         # Each frame counts in full, although its errors are its neighbours': what is shared by all
         # frames has to weigh as much more.
-        alike = np.sqrt(min(len(pose.places), self.configuration.error_seconds / self.step_s))
-        slopes, off = max(1.0, alike) * slopes, max(1.0, alike) * off
+        alike = min(len(pose.places), self.configuration.error_seconds / self.step_s)
+        heavier = np.sqrt(max(1.0, alike))
+        slopes, off = heavier * slopes, heavier * off
         nothing = System.nothing(len(pose.places), UNKNOWNS, shapes + parts)
         return System(
             0.5 * float(off @ off),
@@ -146,7 +147,11 @@ def _second_differences(pose: BodyPose) -> Array:
     turns = pose.rotations[1:] @ np.swapaxes(pose.rotations[:-1], 1, 2)
     turning = Rotation.from_matrix(turns).as_rotvec()
     return np.concatenate(
-        [np.diff(pose.places, 2, axis=0), np.diff(turning, axis=0), np.diff(pose.angles, 2, axis=0)],
+        [
+            np.diff(pose.places, 2, axis=0),
+            np.diff(turning, axis=0),
+            np.diff(pose.angles, 2, axis=0),
+        ],
         axis=1,
     )
 

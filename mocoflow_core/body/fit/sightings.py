@@ -45,9 +45,9 @@ class Sightings:
         Raises InputError for other counts, sizes that disagree, and where nobody is seen.
         """
         count = places.shape[1] if places.ndim == 3 else 0
-        shapes = [places.shape[:2] + (2,), confidence.shape + (2,)]
+        shapes = [(*places.shape[:2], 2), (*confidence.shape, 2)]
         if world is not None:
-            shapes.append(world.shape[:2] + (2,))
+            shapes.append((*world.shape[:2], 2))
         if count not in (17, 33) or any(shape != places.shape for shape in shapes):
             raise InputError(
                 "landmarks (T, 17 or 33, 2) with a confidence each",
@@ -70,9 +70,9 @@ class Sightings:
             BLAZEPOSE_OFFSETS if count == 33 else None,
         )
 
-    def points(self, body: FittableBody, shape: Array) -> Mixtures:
-        """The body's points that the detector would see."""
-        return Mixtures.of(body, body.regressor, shape, self.offsets)
+    def points(self, body: FittableBody) -> Mixtures:
+        """The body's points that the detector would see, in the mean shape."""
+        return Mixtures.of(body, body.regressor, self.offsets)
 
     @property
     def seen(self) -> NDArray[np.bool_]:
