@@ -62,7 +62,7 @@ class Prior:
         usual = (pose.angles - FREEDOM.usual) / FREEDOM.spread
         over = (pose.angles - FREEDOM.most).clip(0) + (pose.angles - FREEDOM.least).clip(None, 0)
         beyond = over / limit
-        slopes = np.stack([1 / FREEDOM.spread + 0 * usual, (over != 0) / limit], 1)
+        slopes = np.stack([np.broadcast_to(1 / FREEDOM.spread, usual.shape), (over != 0) / limit], 1)
         count = len(FREEDOM.joint)
         by_frame = np.zeros((frames, 2 * count + 3, UNKNOWNS))
         for kind in range(2):
