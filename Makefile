@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test stability bench check format
+.PHONY: install demo test e2e stability bench check format
 
 install: $(INSTALLED)
 
@@ -18,6 +18,10 @@ demo: install
 # A file's tests stay together: they share what they make.
 test: install
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# A server, a worker, deployed runs: some minutes.
+e2e: install
+	$(BIN)/python -m pytest -m e2e tests/e2e
 
 stability: install
 	$(BIN)/mocoflow stability --out stability

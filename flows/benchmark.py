@@ -5,18 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from prefect import State, flow
+from prefect import flow
 
-from flows.benchmark_request import BenchmarkRequest, Cell
-from flows.reconstruct import reconstruct
+from flows.benchmark_request import BenchmarkRequest
+from flows.run_cell import run_cell
 from flows.run_facts import show_benchmark_in_prefect
-from mocoflow_core.errors import InputError
-from mocoflow_core.io.run_folder import RunRecord, read_run
-from mocoflow_core.methods.benchmark_folder import BenchmarkRecord, CellRecord
+from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
 from tasks.collect_cells import collect_cells
 from tasks.misplace_views import misplace_views
 from tasks.source import folder_source
-from tasks.terminal_bar import terminal_line
 from tasks.write_benchmark import write_benchmark
 
 TABLES = ("scores.parquet", "error_curve.parquet")
@@ -38,8 +35,9 @@ def benchmark(
 ) -> BenchmarkRecord:
     """Compare methods and presets on several scenes, each cell a flow run of its own.
 
-    Cells run one after the other. One that fails, or whose settings make no sense, is an omission
-    of the comparison and stops no other; one that is finished in its folder is not run again.
+    Cells run one after the other. One that fails, that is cancelled on Prefect's pages, or whose
+    settings make no sense, is an omission of the comparison and stops no other; one that is
+    finished in its folder is not run again.
 
     Args:
         out: new or empty folder, or one of a benchmark with the same settings and budget.
@@ -102,46 +100,3 @@ def misplaced_rows(request: BenchmarkRequest) -> list[dict[str, Any]]:
         for name, shown in request.shifted_scenes()
     ]
     return [row for artifact in measured for row in artifact.summary["rows"]]
-
-
-def run_cell(cell: Cell) -> CellRecord:
-    """Run one cell as a flow run that carries its name, unless its folder is finished."""
-    record, request, out = cell
-    if record.state == "refused":
-        return record
-    terminal_line(record.name)
-    if not _is_finished(cell):
-        named = reconstruct.with_options(flow_run_name=lambda: record.name)
-        state = named(
-            scene=request.scene_path,
-            out=out,
-            preset=request.preset,
-            seed=request.seed,
-            budget_s=request.budget_s,
-            settings=request.settings,
-            store=request.store_url,
-            return_state=True,
-        )
-        if not state.is_completed():
-            ended = "cancelled" if state.is_cancelled() else "failed"
-            return record.model_copy(update={"state": ended, "reason": _reason(state)})
-    return record.finished_as(read_run(out), out)
-
-
-def _reason(state: State[RunRecord]) -> str:
-    """Why it ended, on one line; bad input speaks for itself, other errors say what they are."""
-    error = state.result(raise_on_failure=False)
-    if isinstance(error, InputError):
-        reason = str(error)
-    elif isinstance(error, BaseException):
-        reason = f"{type(error).__name__}: {error}"
-    else:
-        reason = state.message or str(state.name)
-    return " ".join(reason.split())
-
-
-def _is_finished(cell: Cell) -> bool:
-    try:
-        return cell.request.claim(cell.out).is_finished()
-    except InputError:
-        return False  # Its own flow run will say why.

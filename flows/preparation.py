@@ -48,7 +48,14 @@ class Preparation:
 def prepare(request: Request) -> Preparation:
     """Run the stages before the optimisation, or find them in the store."""
     where, chosen = request.store, request.configuration
-    given = ingest_meshes(where, request.recording, request.bodies)
+    given = ingest_meshes(
+        where,
+        request.recording,
+        request.bodies,
+        request.body_model,
+        request.faces,
+        chosen.meshes.without_files(),
+    )
     inspection = inspect_scene(where, request.recording, given, chosen.plan)
     needs = ClipNeeds(
         background=inspection.holds("background_extraction"),

@@ -10,6 +10,7 @@ from uuid import UUID
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import TaskRunContext
 
+from tasks.cancellation import end_if_cancelled
 from tasks.terminal_bar import Progress, terminal_bar
 
 # Each update is an event that Prefect keeps for days.
@@ -20,7 +21,8 @@ SECONDS_BETWEEN_UPDATES = 5.0
 def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Progress]:
     """A callback (fraction in [0, 1], short text) for the body of a stage.
 
-    ``note_time`` is called now and then, so that a killed stage knows what it has cost.
+    ``note_time`` is called now and then, so that a killed stage knows what it has cost. Raises
+    RunCancelled out of the callback when somebody has cancelled the flow run.
     """
     artifact = ProgressArtifact(stage) if TaskRunContext.get() else None
     updated = time.monotonic()
@@ -34,6 +36,7 @@ def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Prog
                 note_time()
                 if artifact:
                     artifact.update(fraction, text)
+                    end_if_cancelled()
 
         yield report
 

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+import threading
+import time
+from contextvars import copy_context
 from pathlib import Path
 
 import pytest
 from prefect.client.orchestration import get_client
+from prefect.client.schemas.objects import StateType
+from prefect.states import Cancelling
 from pyarrow import parquet
 
 from flows.benchmark_request import BenchmarkRequest
@@ -124,6 +130,38 @@ def test_elsewhere_its_cells_come_from_the_store(first, compare, toy_scene, tmp_
     assert cell.from_store
     alone = [row for row in read_scores(out / "scores.parquet") if row.method == "mocoflow"]
     assert read_scores(tmp_path / "again/scores.parquet") == [r for r in alone if r.seed == 0]
+
+
+def cancel_when_running(name: str) -> None:
+    """As a person does on Prefect's pages, as soon as a run of that name is to be seen."""
+    with get_client(sync_client=True) as client:
+        for _ in range(1200):
+            for run in client.read_flow_runs():
+                if run.name == name and run.state.is_running():
+                    client.set_flow_run_state(run.id, Cancelling(), force=True)
+                    return
+            time.sleep(0.05)
+
+
+def test_a_cell_can_be_cancelled_alone_and_the_same_benchmark_goes_on_from_there(
+    compare, toy_scene, tmp_path
+):
+    scene = tmp_path / "cancelled"
+    shutil.copytree(toy_scene, scene)
+    asked = {"scenes": (str(scene),), "methods": METHODS[:1], "settings": ("schedule.rays=63",)}
+    name = "cancelled/toy/mocoflow/0"
+    # Prefect's settings of this session go with the context.
+    person = threading.Thread(target=copy_context().run, args=(cancel_when_running, name))
+    person.start()
+    record = compare(tmp_path / "out", **asked)
+    person.join()
+    assert [cell.state for cell in record.cells] == ["cancelled", "finished"]
+    assert any("cancelled on Prefect" in str(row) for row in record.omissions)
+    with get_client(sync_client=True) as client:
+        [state] = {run.state.type for run in client.read_flow_runs() if run.name == name}
+    assert state == StateType.CANCELLED
+    again = compare(tmp_path / "out", **asked)
+    assert [cell.state for cell in again.cells] == ["finished", "finished"]
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.body.repair import RepairConfig, RoundsConfig
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.decision import with_evidence
 from mocoflow_core.planning.inspection import inspect_scene

@@ -1,0 +1,89 @@
+"""One cell of a benchmark: a flow run of its own, which may fail or be cancelled alone."""
+
+from __future__ import annotations
+
+from uuid import UUID
+
+from prefect import State
+from prefect.context import FlowRunContext
+from prefect.exceptions import Abort
+
+from flows.benchmark_request import Cell
+from flows.reconstruct import reconstruct
+from mocoflow_core.errors import InputError
+from mocoflow_core.io.run_folder import RunRecord, read_run
+from mocoflow_core.methods.benchmark_folder import CellRecord
+from tasks.cancellation import RunCancelled, confirm_cancelled
+from tasks.terminal_bar import terminal_line
+
+CANCELLED = "cancelled on Prefect's pages; the same benchmark again goes on from there"
+
+
+def run_cell(cell: Cell) -> CellRecord:
+    """Run one cell as a flow run that carries its name, unless its folder is finished."""
+    record, request, out = cell
+    if record.state == "refused":
+        return record
+    terminal_line(record.name)
+    if _is_finished(cell):
+        return record.finished_as(read_run(out), out)
+    started = _Started(record.name)
+    try:
+        state = reconstruct.with_options(flow_run_name=started.name)(
+            scene=request.scene_path,
+            out=out,
+            preset=request.preset,
+            seed=request.seed,
+            budget_s=request.budget_s,
+            settings=request.settings,
+            store=request.store_url,
+            return_state=True,
+        )
+    except Abort:  # No stage begins in a run that is being cancelled.
+        if started.run_id is None:
+            raise
+        return _cancelled(record, started.run_id)
+    if state.is_completed():
+        return record.finished_as(read_run(out), out)
+    # A run that is being cancelled stays so until it is confirmed.
+    error = state.result(raise_on_failure=False) if state.is_final() else None
+    told = state.is_cancelling() or state.is_cancelled() or isinstance(error, RunCancelled)
+    if told and started.run_id is not None:
+        return _cancelled(record, started.run_id)
+    return record.model_copy(update={"state": "failed", "reason": _reason(state, error)})
+
+
+class _Started:
+    """The name of a flow run; being asked for it tells which run it is."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self.run_id: UUID | None = None
+
+    def name(self) -> str:
+        context = FlowRunContext.get()
+        self.run_id = context.flow_run.id if context and context.flow_run else None
+        return self._name
+
+
+def _cancelled(record: CellRecord, run_id: UUID) -> CellRecord:
+    confirm_cancelled(run_id)
+    return record.model_copy(update={"state": "cancelled", "reason": CANCELLED})
+
+
+def _reason(state: State[RunRecord], error: object) -> str:
+    """Why it ended, on one line; bad input speaks for itself, other errors say what they are."""
+    if isinstance(error, InputError):
+        reason = str(error)
+    elif isinstance(error, BaseException):
+        reason = f"{type(error).__name__}: {error}"
+    else:
+        reason = state.message or str(state.name)
+    return " ".join(reason.split())
+
+
+def _is_finished(cell: Cell) -> bool:
+    try:
+        return cell.request.claim(cell.out).is_finished()
+    except InputError:
+        return False  # Its own flow run will say why.

@@ -1,0 +1,21 @@
+"""One server with one worker for all end-to-end tests, and a scene for them."""
+
+from __future__ import annotations
+
+import pytest
+
+from mocoflow_core.synthetic.toy import write_toy_scene
+from tests.e2e.production import production
+
+
+@pytest.fixture(scope="session")
+def deployed(tmp_path_factory):
+    with production(tmp_path_factory.mktemp("production")) as made:
+        yield made
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scenes") / "toy"
+    write_toy_scene(folder)
+    return folder
