@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from flows.finished_run import export, render
+from flows.import_dataset import import_dataset
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
@@ -19,6 +20,7 @@ EXPERIMENT_HELP = (
     "removal, progressive, misalignment, partial_observation, train_camera or worse_estimate: "
     "scenes, methods and presets of the paper's, where they are not given."
 )
+SCENE_HELP = "Folder with a scene.json, or of a data set; see docs/datasets."
 MESHES_HELP = (
     "Body meshes to use instead: a file or folder of VIBE, PARE, WHAM, PHALP, 4D-Humans, GVHMR, "
     "TRAM, ROMP, BEV, AIST++ or EasyMocap, a folder of OBJ, PLY or GLB, or a meshes.npz."
@@ -48,7 +50,7 @@ def main() -> None:
 
 @app.command()
 def reconstruct(
-    scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
+    scene: Annotated[Path, typer.Argument(help=SCENE_HELP)],
     out: Annotated[Path | None, typer.Option(help="New folder for the results.")] = None,
     preset: Annotated[str, typer.Option(help=PRESET_HELP)] = "fast",
     meshes: Annotated[Path | None, typer.Option(help=MESHES_HELP)] = None,
@@ -120,7 +122,7 @@ def reconstruct(
 
 @app.command()
 def plan(
-    scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
+    scene: Annotated[Path, typer.Argument(help=SCENE_HELP)],
     preset: Annotated[str, typer.Option(help=PRESET_HELP)] = "fast",
     meshes: Annotated[Path | None, typer.Option(help=MESHES_HELP)] = None,
     person: Annotated[int | None, typer.Option(help=PERSON_HELP)] = None,
@@ -234,6 +236,7 @@ def benchmark(
         sys.exit(1)
 
 
+app.command("import")(import_dataset)
 app.command()(render)
 app.command()(export)
 

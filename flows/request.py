@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.imported_scene import scene_folder
 from flows.stopping import read_target
 from flows.user_folders import cache_folder
 from mocoflow_core.capture.extract import select_training_frames
@@ -50,7 +51,9 @@ class Request(BaseModel):
 
     @cached_property
     def scene(self) -> Scene:
-        return open_scene(self.scene_path, self.configuration.capture.train_camera)
+        chosen = self.configuration
+        folder = scene_folder(self.scene_path, self.meshes is not None, chosen.meshes.body_model)
+        return open_scene(folder, chosen.capture.train_camera)
 
     @cached_property
     def configuration(self) -> Configuration:

@@ -36,7 +36,9 @@ class CaptureConfig(ConfigurationPart):
     train_camera: str | None = Field(
         None, description="Camera to learn from; null: the one that scene.json names."
     )
-    fps: float = Field(12.0, gt=0, description="Working rate; the paper reduces to 12 (sec. 4).")
+    fps: float | None = Field(
+        None, gt=0, description="Working rate; null: the scene's, by default the paper's 12."
+    )
     max_side: int = Field(512, ge=16, description="Longer side of working frames, pixels.")
     held_out_frames: int = Field(
         8, ge=0, description="Source frames between working frames that are kept for scoring."
@@ -146,7 +148,7 @@ def select_training_frames(
     selection = select_frames(
         available,
         scene.description.fps,
-        configuration.fps,
+        configuration.fps or scene.description.working_fps,
         np.array(sorted(masks), np.int32) if masks else available,
         configuration.held_out_frames,
         configuration.holdout_every,
