@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.extract import ClipNeeds, extract_clip, extract_evaluation
 from mocoflow_core.capture.scene import Scene
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.scene_shape import SceneShape
 from mocoflow_core.methods.rendered_views import ScoredView, TrainedRenderer, scored_views

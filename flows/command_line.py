@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,7 @@ from typing import Annotated
 import typer
 
 from flows.finished_run import export, render
+from flows.import_dataset import import_dataset
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from mocoflow_core.errors import InputError
@@ -18,6 +20,13 @@ EXPERIMENT_HELP = (
     "removal, progressive, misalignment, partial_observation, train_camera or worse_estimate: "
     "scenes, methods and presets of the paper's, where they are not given."
 )
+SCENE_HELP = "Folder with a scene.json, or of a data set; see docs/datasets."
+MESHES_HELP = (
+    "Body meshes to use instead: a file or folder of VIBE, PARE, WHAM, PHALP, 4D-Humans, GVHMR, "
+    "TRAM, ROMP, BEV, AIST++ or EasyMocap, a folder of OBJ, PLY or GLB, or a meshes.npz."
+)
+PERSON_HELP = "Id of the person among those of --meshes; by default the longest track."
+BODY_MODEL_HELP = "SMPL or SMPL-X model file, where the meshes need one."
 PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(
@@ -41,10 +50,12 @@ def main() -> None:
 
 @app.command()
 def reconstruct(
-    scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
+    scene: Annotated[Path, typer.Argument(help=SCENE_HELP)],
     out: Annotated[Path | None, typer.Option(help="New folder for the results.")] = None,
     preset: Annotated[str, typer.Option(help=PRESET_HELP)] = "fast",
-    meshes: Annotated[Path | None, typer.Option(help="Body meshes to use instead.")] = None,
+    meshes: Annotated[Path | None, typer.Option(help=MESHES_HELP)] = None,
+    person: Annotated[int | None, typer.Option(help=PERSON_HELP)] = None,
+    body_model: Annotated[Path | None, typer.Option(help=BODY_MODEL_HELP)] = None,
     seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
     budget: Annotated[
         float | None, typer.Option(help="Seconds of the training clock.", min=1.0)
@@ -71,6 +82,7 @@ def reconstruct(
     from flows.request import Request
 
     out = out or Path(f"{scene.resolve().name}-reconstructed")
+    settings = _with_estimate(settings, person, body_model)
     request = Request(
         scene_path=scene,
         preset=preset,
@@ -78,7 +90,7 @@ def reconstruct(
         seed=seed,
         budget_s=budget,
         until=until,
-        settings=tuple(settings or ()),
+        settings=tuple(settings),
         store_url=store,
         devices=devices,
         machines=machines,
@@ -110,9 +122,11 @@ def reconstruct(
 
 @app.command()
 def plan(
-    scene: Annotated[Path, typer.Argument(help="Folder with a scene.json.")],
+    scene: Annotated[Path, typer.Argument(help=SCENE_HELP)],
     preset: Annotated[str, typer.Option(help=PRESET_HELP)] = "fast",
-    meshes: Annotated[Path | None, typer.Option(help="Body meshes to use instead.")] = None,
+    meshes: Annotated[Path | None, typer.Option(help=MESHES_HELP)] = None,
+    person: Annotated[int | None, typer.Option(help=PERSON_HELP)] = None,
+    body_model: Annotated[Path | None, typer.Option(help=BODY_MODEL_HELP)] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
@@ -123,9 +137,8 @@ def plan(
     from flows.request import Request
 
     # Bad settings are refused before anything heavy is loaded.
-    request = Request(
-        scene_path=scene, preset=preset, meshes=meshes, settings=tuple(settings or ())
-    )
+    settings = _with_estimate(settings, person, body_model)
+    request = Request(scene_path=scene, preset=preset, meshes=meshes, settings=tuple(settings))
     request.check()
     set_environment()
     from rich.console import Console
@@ -138,10 +151,20 @@ def plan(
             scene=scene,
             preset=preset,
             meshes=meshes,
-            settings=tuple(settings or ()),
+            settings=tuple(settings),
             store=store,
         )
     print_plan(planned, Console())
+
+
+def _with_estimate(
+    settings: list[str] | None, person: int | None, body_model: Path | None
+) -> list[str]:
+    """The settings, with those that have options of their own."""
+    own = [] if person is None else [f"meshes.person={person}"]
+    if body_model is not None:
+        own.append(f"meshes.body_model={json.dumps(str(body_model))}")
+    return [*(settings or ()), *own]
 
 
 @app.command(cls=ListOptions)
@@ -213,6 +236,7 @@ def benchmark(
         sys.exit(1)
 
 
+app.command("import")(import_dataset)
 app.command()(render)
 app.command()(export)
 

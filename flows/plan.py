@@ -26,7 +26,7 @@ def plan(
     Args:
         scene: folder with a scene.json.
         preset: complete configuration to start from.
-        meshes: body meshes to use instead of the scene's own.
+        meshes: body meshes to use instead of the scene's own: an estimator's file or folder.
         settings: single fields, such as ``plan.motion_residual=off``.
         store: folder or fsspec address of the artifact store.
     """

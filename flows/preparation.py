@@ -48,7 +48,14 @@ class Preparation:
 def prepare(request: Request) -> Preparation:
     """Run the stages before the optimisation, or find them in the store."""
     where, chosen = request.store, request.configuration
-    given = ingest_meshes(where, request.recording, request.bodies)
+    given = ingest_meshes(
+        where,
+        request.recording,
+        request.bodies,
+        request.body_model,
+        request.faces,
+        chosen.meshes.without_files(),
+    )
     inspection = inspect_scene(where, request.recording, given, chosen.plan)
     needs = ClipNeeds(
         background=inspection.holds("background_extraction"),
@@ -57,11 +64,14 @@ def prepare(request: Request) -> Preparation:
     )
     turned = given if chosen.capture.least_shown > 0 else None
     clip = extract_clip(where, request.recording, chosen.capture, needs, turned)
-    bodies = given
+    located = None
     if inspection.holds("location_search"):
-        bodies = locate_body(where, clip, given, chosen.location)
+        located = locate_body(where, clip, given, chosen.location)
+    bodies = located or given
     repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
-    plan = plan_scene(where, clip, repaired, inspection, chosen.plan, chosen.representation)
+    plan = plan_scene(
+        where, clip, repaired, inspection, chosen.plan, chosen.representation, located
+    )
     start = _start_networks if chosen.representation == "networks" else _start_hybrid
     density, motion = start(request, clip, repaired, plan)
     return Preparation(given, inspection, clip, bodies, repaired, plan, density, motion)

@@ -44,7 +44,7 @@ def reconstruct(
         scene: folder with a scene.json.
         out: new or empty folder, or one of the same request, for what the user keeps.
         preset: complete configuration to start from.
-        meshes: body meshes to use instead of the scene's own.
+        meshes: body meshes to use instead of the scene's own: an estimator's file or folder.
         seed: of everything random.
         budget_s: seconds of the training clock.
         until: score at which the optimisation stops, such as ``train_psnr=30``.

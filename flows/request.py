@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.imported_scene import scene_folder
 from flows.stopping import read_target
 from flows.user_folders import cache_folder
 from mocoflow_core.capture.extract import select_training_frames
@@ -20,7 +21,7 @@ from mocoflow_core.io.store import Store
 from mocoflow_core.presets import PRESETS, Configuration
 from mocoflow_core.settings import with_settings
 from mocoflow_core.training.devices import Devices, choose_devices
-from tasks.source import Source, clip_source, evaluation_source, meshes_source
+from tasks.source import Source, clip_source, evaluation_source, file_source, meshes_source
 
 # Counts up when a finished folder of an earlier version must not be taken for a finished one.
 REQUEST_VERSION = 1
@@ -50,7 +51,9 @@ class Request(BaseModel):
 
     @cached_property
     def scene(self) -> Scene:
-        return open_scene(self.scene_path, self.configuration.capture.train_camera)
+        chosen = self.configuration
+        folder = scene_folder(self.scene_path, self.meshes is not None, chosen.meshes.body_model)
+        return open_scene(folder, chosen.capture.train_camera)
 
     @cached_property
     def configuration(self) -> Configuration:
@@ -85,10 +88,22 @@ class Request(BaseModel):
 
     @cached_property
     def bodies(self) -> Source | None:
-        """The body meshes' file."""
-        if self.meshes and not self.meshes.is_file():
-            raise InputError("--meshes must be a file", str(self.meshes), "Check the path.")
+        """The body meshes' file or folder."""
+        if self.meshes and not self.meshes.exists():
+            raise InputError(
+                "--meshes must be a file or a folder", str(self.meshes), "Check the path."
+            )
         return meshes_source(self.scene, self.meshes)
+
+    @cached_property
+    def body_model(self) -> Source | None:
+        """The body model's file, where one is given."""
+        return file_source(self.configuration.meshes.body_model, "--body-model")
+
+    @cached_property
+    def faces(self) -> Source | None:
+        """The file whose faces the bodies share, where one is given."""
+        return file_source(self.configuration.meshes.faces, "meshes.faces")
 
     @cached_property
     def others(self) -> Source:
@@ -98,7 +113,7 @@ class Request(BaseModel):
     def check(self) -> None:
         """Raise InputError for what settings and file names show to be wrong, before any work."""
         select_training_frames(self.scene, self.configuration.capture)
-        _ = self.bodies, self.processes
+        _ = self.bodies, self.body_model, self.faces, self.processes
 
     def claim(self, out: Path) -> RunFolder:
         """Take a folder for the results. Raises InputError when it holds anything else."""
@@ -120,7 +135,12 @@ class Request(BaseModel):
         inputs = {
             "recording": self.recording.digest,
             "bodies": self.bodies.digest if self.bodies else "",
+            "body_model": self.body_model.digest if self.body_model else "",
+            "faces": self.faces.digest if self.faces else "",
             "others": self.others.digest,
         }
-        values = {"configuration": self.configuration.model_dump(mode="json"), "seed": self.seed}
+        # Files count by their content, wherever they lie.
+        chosen = self.configuration
+        chosen = chosen.model_copy(update={"meshes": chosen.meshes.without_files()})
+        values = {"configuration": chosen.model_dump(mode="json"), "seed": self.seed}
         return key_of("reconstruct", REQUEST_VERSION, inputs, values)

@@ -1,4 +1,4 @@
-"""Where a user's programs keep what can be made again."""
+"""Where a user's programs keep what can be made again, and what was put there once."""
 
 from __future__ import annotations
 
@@ -10,3 +10,10 @@ def cache_folder() -> Path:
     """mocoflow's folder in the user's cache (``XDG_CACHE_HOME``, by default ``~/.cache``)."""
     cache = os.environ.get("XDG_CACHE_HOME")
     return (Path(cache) if cache else Path.home() / ".cache") / "mocoflow"
+
+
+def body_models_folder() -> Path:
+    """Where body models lie that no option names (``XDG_DATA_HOME``, else ``~/.local/share``)."""
+    data = os.environ.get("XDG_DATA_HOME")
+    share = Path(data) if data else Path.home() / ".local" / "share"
+    return share / "mocoflow" / "body_models"

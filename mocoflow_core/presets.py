@@ -9,6 +9,7 @@ from mocoflow_core.body.location import LocationConfig
 from mocoflow_core.body.repair import RepairConfig
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.estimators.configuration import EstimateConfig
 from mocoflow_core.fields.body_lattices import BodyMotionConfig
 from mocoflow_core.fields.canonical_grid import CanonicalConfig
 from mocoflow_core.fields.network_field import NetworksConfig
@@ -32,6 +33,7 @@ class Configuration(ConfigurationPart):
 
     representation: Representation = "hybrid"
     capture: CaptureConfig = CaptureConfig()
+    meshes: EstimateConfig = EstimateConfig()
     location: LocationConfig = LocationConfig()
     repair: RepairConfig = RepairConfig()
     plan: PlanConfig = PlanConfig()

@@ -5,13 +5,15 @@ from __future__ import annotations
 from mocoflow_core.artifacts import ClipArtifact, MeshArtifact
 from mocoflow_core.body.facing import frames_that_show, turned_away_warning
 from mocoflow_core.capture import extract
+from mocoflow_core.capture.composite import composite_clip
 from mocoflow_core.capture.extract import CaptureConfig, ClipNeeds
 from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.capture.shadows import shadowed_area
 from mocoflow_core.capture.strange_frames import sound_clip
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 3  # What is usual is measured on training frames alone.
+ALGORITHM_VERSION = 4  # What is behind the person can be replaced; shadows are measured.
 
 
 @stage(ClipArtifact, ALGORITHM_VERSION)
@@ -30,7 +32,9 @@ def extract_clip(
     scene = open_scene(recording.path, recording.train_camera)
     only = bodies and frames_that_show(work.open(bodies), scene, capture.least_shown)
     extracted = extract.extract_clip(scene, capture, needs, only)
-    clip, warnings = sound_clip(extracted, capture.difference_threshold)
+    sound, warnings = sound_clip(extracted, capture.difference_threshold)
+    mask_files = {} if needs.masks else scene.masks(scene.train_camera)
+    clip = composite_clip(scene, sound, capture.behind_person, mask_files)
     selected, every = (
         len(extract.select_training_frames(scene, capture, some).all) for some in (only, None)
     )
@@ -46,5 +50,7 @@ def extract_clip(
         "source_fps": scene.description.fps,
         "up": scene.up.tolist(),
         "camera": {"name": clip.camera.name, **clip.camera.to_json()},
-        "warnings": [*warnings, *away],
+        "behind_person": capture.behind_person,
+        "shadowed": shadowed_area(sound),
+        "warnings": [*clip.remarks, *warnings, *away],
     }

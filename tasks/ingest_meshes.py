@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from mocoflow_core.artifacts import MeshArtifact
-from mocoflow_core.body import ingest
 from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.estimators import ingest
+from mocoflow_core.estimators.configuration import EstimateConfig
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
@@ -12,13 +13,24 @@ ALGORITHM_VERSION = 2  # Faces wind outwards; frozen and flipping estimates are 
 
 
 @stage(MeshArtifact, ALGORITHM_VERSION)
-def ingest_meshes(work: Stage, recording: Source, meshes: Source | None) -> Summary:
+def ingest_meshes(
+    work: Stage,
+    recording: Source,
+    meshes: Source | None,
+    body_model: Source | None,
+    faces: Source | None,
+    estimate: EstimateConfig,
+) -> Summary:
     """A body mesh for each source frame, its coordinates stated.
 
-    Output: ``meshes.npz`` and ``ingested.json``. Below a second.
+    Output: ``meshes.npz``, ``ingested.json`` and, where it is known about where root-centred
+    bodies stand, ``first_translations.npy``. Seconds where bodies are posed, else below one.
     """
     scene = open_scene(recording.path, recording.train_camera)
-    ingested = ingest.ingest_meshes(scene, meshes.path if meshes else None)
+    chosen = estimate.with_files(
+        body_model.path if body_model else None, faces.path if faces else None
+    )
+    ingested = ingest.ingest_meshes(scene, meshes.path if meshes else None, chosen)
     ingested.save(work.folder)
     return {
         "coordinates": ingested.coordinates,

@@ -9,7 +9,7 @@ from mocoflow_core.body.location import LocationConfig
 from mocoflow_core.capture.clip import Clip
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Beyond the image a body is not missed; a bad start is replaced.
+ALGORITHM_VERSION = 3  # Wrong masks lose their say; masks that are cut keep theirs.
 
 
 @stage(LocationArtifact, ALGORITHM_VERSION)
@@ -18,10 +18,11 @@ def locate_body(
 ) -> Summary:
     """The location search (MoCo-Flow sec. 3.1).
 
-    Output: ``meshes.npz`` in world metres and ``location.npz``. About 0.1 s a frame.
+    Output: ``meshes.npz`` in world metres and ``location.npz`` with each frame's residual and
+    confidence. About 0.1 s a frame.
     """
     located = location.locate_body(
         Clip.load(work.open(clip)), IngestedMeshes.load(work.open(meshes)), search, work.progress
     )
     located.save(work.folder)
-    return {"warnings": list(located.warnings)}
+    return {"quality": located.quality, "warnings": list(located.warnings)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mocoflow_core.artifacts import (
     ClipArtifact,
     InspectionArtifact,
+    LocationArtifact,
     PlanArtifact,
     RepairArtifact,
 )
@@ -12,13 +13,13 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.planning import plan as planning
 from mocoflow_core.planning.configuration import PlanConfig
-from mocoflow_core.planning.decision import Decision
+from mocoflow_core.planning.decision import Decision, with_evidence
 from mocoflow_core.planning.inspection import Inspection
-from mocoflow_core.planning.preparation import decide_frames, decide_preparation
+from mocoflow_core.planning.preparation import decide_frames, decide_preparation, decide_shadows
 from mocoflow_core.planning.visibility import visibility_warnings
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # Brightness is compared between training frames alone.
+ALGORITHM_VERSION = 5  # Says whether shadows are removed, and how sure the location is.
 
 
 @stage(PlanArtifact, ALGORITHM_VERSION)
@@ -29,6 +30,7 @@ def plan_scene(
     inspection: InspectionArtifact,
     plan: PlanConfig,
     representation: planning.Representation,
+    located: LocationArtifact | None = None,
 ) -> Summary:
     """Decides from the train side alone; each decision carries its evidence.
 
@@ -39,7 +41,11 @@ def plan_scene(
     meshes = MeshSequence.load(work.open(bodies) / "meshes.npz")
     seen = Clip.load(work.open(clip))
     frames = decide_frames(clip.summary["repeated"], clip.summary["frames"], plan)
-    preparation = (*decide_preparation(found, plan), frames, repair)
+    shadows = decide_shadows(clip.summary["shadowed"], clip.summary["behind_person"], plan)
+    before = decide_preparation(found, plan)
+    if located:
+        before = with_evidence(before, "location_search", located.summary["quality"])
+    preparation = (*before, frames, shadows, repair)
     decided = planning.plan_scene(seen, meshes, preparation, plan, representation)
     (work.folder / "plan.json").write_text(decided.model_dump_json(indent=1))
     return {

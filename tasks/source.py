@@ -8,6 +8,8 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from mocoflow_core.capture.scene import Scene
+from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.stored import estimate_files
 from mocoflow_core.io.content_key import digest_document, digest_file, digest_files
 
 
@@ -31,12 +33,21 @@ def clip_source(scene: Scene) -> Source:
 
 
 def meshes_source(scene: Scene, given: Path | None) -> Source | None:
-    """The body meshes: a file of the user's, or else the scene's own, if it brings one."""
-    file = given or scene.meshes()
-    if file is None or not file.is_file():
+    """The body meshes: a file or folder of the user's, or the scene's own, if it brings one."""
+    path = given or scene.meshes()
+    if path is None or not path.exists():
         return None
     described = scene.training_description()["meshes"]
-    return Source(path=file, digest=digest_document([described, digest_file(file)]))
+    return Source(path=path, digest=digest_document([described, _digest(path)]))
+
+
+def file_source(file: Path | None, what: str) -> Source | None:
+    """A single file of the user's. Raises InputError where a path leads to none."""
+    if file is None:
+        return None
+    if not file.is_file():
+        raise InputError(f"{what} must be a file", f"{file}", "Check the path.")
+    return Source(path=file, digest=digest_file(file))
 
 
 def evaluation_source(scene: Scene) -> Source:
@@ -47,6 +58,13 @@ def evaluation_source(scene: Scene) -> Source:
 def folder_source(folder: Path, names: Iterable[str]) -> Source:
     """The named files of a folder."""
     return Source(path=folder, digest=digest_files({name: folder / name for name in names}))
+
+
+def _digest(path: Path) -> str:
+    """Of a file's bytes, or of the names and bytes of all that a folder's reader may open."""
+    if path.is_file():
+        return digest_file(path)
+    return digest_files({str(file.relative_to(path)): file for file in estimate_files(path)})
 
 
 def _source(scene: Scene, description: dict[str, object], files: list[Path]) -> Source:

@@ -7,8 +7,7 @@ time.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +16,18 @@ from pydantic import Field
 from mocoflow_core.body.agreement import is_cut
 from mocoflow_core.body.grid_search import Placement, first_guess, search_grid
 from mocoflow_core.body.ingest import IngestedMeshes
-from mocoflow_core.body.mask_crop import MaskCrop, facing
-from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.located_meshes import LocatedMeshes
+from mocoflow_core.body.mask_crop import NEAR_M, MaskCrop, facing
 from mocoflow_core.body.outline_fit import fit_outline
-from mocoflow_core.body.smooth_path import smooth_path
+from mocoflow_core.body.robust_path import robust_path
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.capture.strange_frames import listed
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 
 Array = NDArray[np.float64]
+# Where no frame can be trusted at all, all count alike.
+EVEN_CONFIDENCE = 0.01
 
 
 class LocationConfig(ConfigurationPart):
@@ -49,8 +51,11 @@ class LocationConfig(ConfigurationPart):
     least_overlap: float = Field(
         0.4, ge=0, lt=1, description="Frames that overlap less say nothing of the location."
     )
-    cut_confidence: float = Field(
-        0.02, ge=0, le=1, description="Confidence of a mask that the image border cuts."
+    cut_power: float = Field(
+        4.0, ge=0, description="Confidence falls with this power of the share of the body in sight."
+    )
+    doubtful: float = Field(
+        0.05, ge=0, lt=1, description="Frames of less confidence are told of in a warning."
     )
     depth_noise_m: float = Field(0.03, gt=0, description="Usual error of a frame's depth, metres.")
     lateral_noise_m: float = Field(
@@ -61,41 +66,6 @@ class LocationConfig(ConfigurationPart):
     )
 
 
-@dataclass(frozen=True, eq=False)
-class LocatedMeshes:
-    """Meshes in world metres, at every source frame, and how sure their location is."""
-
-    meshes: MeshSequence
-    translations: Array  # (T, 3) metres, what was added in the train camera's axes
-    residual: Array  # (T,) 1 - overlap of the frame's own best placement; nan where not searched
-    confidence: Array  # (T,) 0 where the location is interpolated
-    warnings: tuple[str, ...]
-
-    def save(self, folder: Path) -> None:
-        """Write ``meshes.npz`` and ``location.npz`` into an existing folder."""
-        self.meshes.save(folder / "meshes.npz")
-        with (folder / "location.npz").open("wb") as file:
-            np.savez(
-                file,
-                translations=self.translations,
-                residual=self.residual,
-                confidence=self.confidence,
-                warnings=np.array(self.warnings, dtype=np.str_),
-            )
-
-    @classmethod
-    def load(cls, folder: Path) -> LocatedMeshes:
-        """Inverse of ``save``."""
-        with np.load(folder / "location.npz", allow_pickle=False) as arrays:
-            return cls(
-                MeshSequence.load(folder / "meshes.npz"),
-                arrays["translations"],
-                arrays["residual"],
-                arrays["confidence"],
-                tuple(str(warning) for warning in arrays["warnings"]),
-            )
-
-
 def locate_body(
     clip: Clip,
     ingested: IngestedMeshes,
@@ -104,9 +74,10 @@ def locate_body(
 ) -> LocatedMeshes:
     """Find the body's translation in each frame from the train camera's masks.
 
-    Root-centred meshes are searched from the mask's size; others from where they are given.
-    Held-out frames, frames without a mask and frames between those of the clip are interpolated;
-    masks cut by the image border count little.
+    Root-centred meshes are searched from the mask's size and from their first translations, others
+    from where they are given. Frames whose place disagrees with those around them, whatever their
+    mask shows, lose their say. Held-out frames, frames without a mask and frames between those of
+    the clip are interpolated.
 
     Raises InputError when no mask shows the person.
     """
@@ -114,30 +85,32 @@ def locate_body(
     searched = np.flatnonzero(~clip.held_out & clip.masks.any(axis=(1, 2)))
     if not len(searched):
         raise InputError("a mask that shows the person", "empty masks only", "Check the masks.")
-    rows = {int(index): row for row, index in enumerate(ingested.meshes.frame_indices)}
+    numbers = ingested.meshes.frame_indices
+    rows = np.searchsorted(numbers, clip.frame_indices[searched])
     centres = posed.mean(axis=1)
     found = np.full((len(posed), 3), np.nan)
     residual = np.full(len(posed), np.nan)
     confidence = np.zeros(len(posed))
-    for done, position in enumerate(searched.tolist()):
-        row = rows[int(clip.frame_indices[position])]
-        placement = _place(clip, position, posed[row], ingested, configuration)
+    for done, (position, row) in enumerate(zip(searched.tolist(), rows.tolist(), strict=True)):
+        starts = _starts(ingested, row)
+        placement = _place(clip, position, posed[row], ingested.meshes.faces, starts, configuration)
         found[row] = centres[row] + placement.translation
         residual[row] = 1 - placement.overlap
-        confidence[row] = _confidence(clip.masks[position], placement, configuration)
-        progress((done + 1) / len(searched), f"located frame {clip.frame_indices[position]}")
+        confidence[row] = _confidence(clip, posed[row], placement, configuration)
+        progress((done + 1) / len(searched), f"located frame {numbers[row]}")
     if not confidence.any():
-        # No frame can be trusted more than another: all count alike.
-        confidence = np.where(np.isfinite(residual), configuration.cut_confidence, 0.0)
-    path = _smooth(clip, ingested.meshes.frame_indices, found, confidence, configuration)
+        confidence[rows] = EVEN_CONFIDENCE
+    path, kept = _smooth(clip, numbers, found, confidence, configuration)
+    confidence = confidence * kept
     translations = path - centres
     world = clip.camera.to_world(posed + translations[:, None])
+    cut = numbers[rows[[is_cut(clip.masks[position]) for position in searched]]]
     return LocatedMeshes(
         replace(ingested.meshes, vertices=world.astype(np.float32)),
         translations,
         residual,
         confidence,
-        _warnings(residual, confidence, configuration),
+        _warnings(numbers, cut, residual, confidence, configuration),
     )
 
 
@@ -146,22 +119,30 @@ def _in_camera(clip: Clip, ingested: IngestedMeshes) -> Array:
     return clip.camera.to_camera(vertices) if ingested.coordinates == "world" else vertices
 
 
+def _starts(ingested: IngestedMeshes, row: int) -> list[Array]:
+    """Translations (3,) at which one frame's body may stand already."""
+    if ingested.coordinates == "world":
+        return [np.zeros(3)]
+    if ingested.first_translations is None:
+        return []
+    first = ingested.first_translations[row]
+    return [first] if np.isfinite(first).all() else []
+
+
 def _place(
     clip: Clip,
     position: int,
     points: Array,
-    ingested: IngestedMeshes,
+    faces: NDArray[np.int32],
+    starts: list[Array],
     configuration: LocationConfig,
 ) -> Placement:
     """The best translation of one frame's body, found from its mask alone."""
     mask, pad = clip.masks[position], configuration.crop_pad
     grid = MaskCrop.around(mask, clip.camera, configuration.grid_px, pad)
     fine = MaskCrop.around(mask, clip.camera, configuration.outline_px, pad)
-    faces = ingested.meshes.faces
-    starts = [first_guess(points, faces, grid)]
-    if ingested.coordinates != "camera-root-centred":
-        starts.append(np.zeros(3))
     # A given place far nearer than the true one fills the crop, where no shift improves it.
+    starts = [first_guess(points, faces, grid), *starts]
     start = max(starts, key=lambda start: _overlap(points + start, faces, grid))
     front = facing(points + start, faces)
     best = search_grid(points, front, grid, start, configuration.spans, configuration.depths)
@@ -183,11 +164,16 @@ def _overlap(points: Array, faces: NDArray[np.int32], crop: MaskCrop) -> float:
 
 
 def _confidence(
-    mask: NDArray[np.bool_], placement: Placement, configuration: LocationConfig
+    clip: Clip, points: Array, placement: Placement, configuration: LocationConfig
 ) -> float:
+    """How well the placed body (V, 3) fits the mask, and how much of it the image shows."""
     least = configuration.least_overlap
     trust = max(placement.overlap - least, 0.0) / (1 - least)
-    return trust * (configuration.cut_confidence if is_cut(mask) else 1.0)
+    placed = (points + placement.translation) @ clip.camera.K.T
+    pixels = placed[:, :2] / np.maximum(placed[:, 2:], NEAR_M)
+    size = (clip.camera.width, clip.camera.height)
+    in_sight = float(((pixels >= 0) & (pixels <= size)).all(axis=1).mean())
+    return trust * in_sight**configuration.cut_power
 
 
 def _smooth(
@@ -196,30 +182,32 @@ def _smooth(
     found: Array,
     confidence: Array,
     configuration: LocationConfig,
-) -> Array:
-    """The path (T, 3) of the body's centre, in the camera's axes.
+) -> tuple[Array, Array]:
+    """The path (T, 3) of the body's centre in the camera's axes, and how much of each frame's
+    confidence (T,) is kept: little where the frame disagrees with those around it.
 
-    Depth is the noisy part, so it is smoothed first; the direction to the body is kept by its own
-    small noise, and the position follows along the ray.
+    Depth is the noisy part; the direction to the body is kept by its own small noise, and the
+    position follows along the ray.
     """
     numbers = np.arange(frame_indices[0], frame_indices[-1] + 1)
     rows = frame_indices - frame_indices[0]
-    step_s = _source_step_s(clip)
-    weights = np.zeros(len(numbers))
-    weights[rows] = confidence
     typical_m = float(np.median(found[confidence > 0, 2]))
-
-    def smoothed(values: Array, noise_m: float) -> Array:
-        spread = np.zeros(len(numbers))
-        spread[rows] = np.nan_to_num(values)
-        return smooth_path(spread, weights, noise_m, configuration.acceleration_m_s2, step_s)[rows]
-
-    depth = smoothed(found[:, 2], configuration.depth_noise_m)
     # Directions as lateral metres at the typical depth, so that one noise fits all.
     lateral = typical_m * found[:, :2] / found[:, 2:]
-    x = smoothed(lateral[:, 0], configuration.lateral_noise_m)
-    y = smoothed(lateral[:, 1], configuration.lateral_noise_m)
-    return np.stack([x * depth / typical_m, y * depth / typical_m, depth], axis=-1)
+    spread, weights = np.zeros((len(numbers), 3)), np.zeros(len(numbers))
+    spread[rows] = np.nan_to_num(np.column_stack([lateral, found[:, 2]]))
+    weights[rows] = confidence
+    lateral_m, depth_m = configuration.lateral_noise_m, configuration.depth_noise_m
+    path, kept = robust_path(
+        spread,
+        weights,
+        np.array([lateral_m, lateral_m, depth_m]),
+        configuration.acceleration_m_s2,
+        _source_step_s(clip),
+    )
+    x, y, depth = path[rows].T
+    path = np.stack([x * depth / typical_m, y * depth / typical_m, depth], axis=-1)
+    return path, kept[rows]
 
 
 def _source_step_s(clip: Clip) -> float:
@@ -230,15 +218,27 @@ def _source_step_s(clip: Clip) -> float:
     return 1.0 / (clip.fps * float(np.median(np.diff(working))))
 
 
-def _warnings(residual: Array, confidence: Array, configuration: LocationConfig) -> tuple[str, ...]:
+def _warnings(
+    numbers: NDArray[np.int32],
+    cut: NDArray[np.int32],
+    residual: Array,
+    confidence: Array,
+    configuration: LocationConfig,
+) -> tuple[str, ...]:
+    """``numbers`` (T,) of the source; ``cut`` those of masks that the border cuts."""
     searched = np.isfinite(residual)
     overlap = 1 - float(np.median(residual[searched]))
-    poor = int((searched & (confidence <= configuration.cut_confidence)).sum())
+    doubtful = numbers[searched & (confidence <= configuration.doubtful)]
     warnings = []
-    if poor:
+    if len(cut):
         warnings.append(
-            f"{poor} of {searched.sum()} masks are cut by the image border or fit badly: "
-            "the location there follows the neighbouring frames"
+            f"{len(cut)} of {searched.sum()} masks are cut by the image border "
+            f"({listed(cut.tolist())}): the body is located from what is seen of it"
+        )
+    if len(doubtful):
+        warnings.append(
+            f"{len(doubtful)} of {searched.sum()} masks fit badly or disagree with the frames "
+            f"around ({listed(doubtful.tolist())}): the location there follows its neighbours"
         )
     if overlap < configuration.least_overlap + 0.2:
         warnings.append(f"the located body overlaps the masks by {overlap:.2f} only")

@@ -46,6 +46,8 @@ class _Shape:
         mask = crop.beyond(mask)
         inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1)
         distance = signed_distance(mask).astype(np.float64)
+        if mask.all() or not mask.any():
+            return cls(np.empty((0, 2), np.intp), distance, np.zeros((*mask.shape, 2)))
         slope = np.stack([np.gradient(distance, axis=1), np.gradient(distance, axis=0)], axis=-1)
         return cls(np.argwhere(mask & (inner == 0) & crop.seen), distance, slope)
 

@@ -29,11 +29,19 @@ def smooth_path(
         usual = np.average(positions[known], weights=confidence[known]) if known.any() else 0.0
         return np.where(known, positions, usual)
     weight = np.where(known, confidence, 0.0) / noise_m**2
-    # The second difference over step^2 is the acceleration; the sum over steps its integral.
-    stiffness = 1.0 / (acceleration_m_s2**2 * ACCELERATION_TIME_S * step_s**3)
-    bands = stiffness * _second_difference_bands(len(positions))
+    bands = _stiffness(acceleration_m_s2, step_s) * _second_difference_bands(len(positions))
     bands[-1] += weight
     return solveh_banded(bands, weight * np.where(known, positions, 0.0))
+
+
+def bending(path: Array, acceleration_m_s2: float, step_s: float) -> float:
+    """What ``smooth_path`` pays for the accelerations of a path (T,)."""
+    return _stiffness(acceleration_m_s2, step_s) * float((np.diff(path, 2) ** 2).sum())
+
+
+def _stiffness(acceleration_m_s2: float, step_s: float) -> float:
+    # The second difference over step^2 is the acceleration; the sum over steps its integral.
+    return 1.0 / (acceleration_m_s2**2 * ACCELERATION_TIME_S * step_s**3)
 
 
 def _second_difference_bands(count: int) -> Array:

@@ -31,6 +31,23 @@ def background_plate(frames: Frames, masks: Masks, margin_px: int) -> NDArray[np
     return filled.astype(np.uint8, copy=False)
 
 
+def plate_without_masks(frames: Frames, threshold: int, margin_px: int) -> NDArray[np.uint8]:
+    """The plate (H, W, 3) of frames whose person is known from nothing but moving on.
+
+    The median over all frames first; then the median over those that lie within ``threshold`` of
+    it (the largest difference over the channels, 1/255; grown by ``margin_px``), which what passed
+    by no longer biases. Where the same thing is seen in most frames it is taken for background.
+    """
+    first, _ = _masked_median(frames, np.zeros(frames.shape[:3], bool))
+    differs = np.stack([cv2.absdiff(frame, first).max(axis=-1) > threshold for frame in frames])
+    return background_plate(frames, differs, margin_px)
+
+
+def covered_share(masks: Masks) -> float:
+    """Share of the picture that the person covers in every frame: a plate must guess there."""
+    return float(masks.all(axis=0).mean())
+
+
 def masks_from_plate(frames: Frames, plate: NDArray[np.uint8], threshold: int) -> Masks:
     """The largest region of each frame that differs from the plate by more than ``threshold``.
 

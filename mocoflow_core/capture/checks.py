@@ -39,13 +39,7 @@ def check_capture(clip: Clip, source: Camera) -> CaptureFindings:
     share = float(np.median(shares))
     motion_px = background_motion_px(clip.frames, clip.masks) * source.width / clip.camera.width
     empty = int((shares == 0).sum())
-    warnings = _principal_point(source) + _focal_length(source)
-    if not FOREGROUND_SHARE[0] <= share <= FOREGROUND_SHARE[1]:
-        warnings.append(
-            f"masks cover {100 * share:.2g} % of the image "
-            f"(usual: {100 * FOREGROUND_SHARE[0]:g} to {100 * FOREGROUND_SHARE[1]:g} %): "
-            "inverted, empty, or a person far away?"
-        )
+    warnings = [*check_lens(source), *check_share(share)]
     if empty:
         warnings.append(f"{empty} of {len(shares)} looked-at masks are empty")
     if motion_px > LARGEST_BACKGROUND_MOTION_PX:
@@ -54,6 +48,22 @@ def check_capture(clip: Clip, source: Camera) -> CaptureFindings:
             f"(limit {LARGEST_BACKGROUND_MOTION_PX} px): does the camera stand still?"
         )
     return CaptureFindings(share, empty, motion_px, tuple(warnings))
+
+
+def check_lens(camera: Camera) -> tuple[str, ...]:
+    """Whether K is that of a usual lens, for pictures of this size."""
+    return (*_principal_point(camera), *_focal_length(camera))
+
+
+def check_share(share: float) -> tuple[str, ...]:
+    """Whether masks cover a usual share of the image."""
+    if FOREGROUND_SHARE[0] <= share <= FOREGROUND_SHARE[1]:
+        return ()
+    return (
+        f"masks cover {100 * share:.2g} % of the image "
+        f"(usual: {100 * FOREGROUND_SHARE[0]:g} to {100 * FOREGROUND_SHARE[1]:g} %): "
+        "inverted, empty, or a person far away?",
+    )
 
 
 def check_masks(masks: Iterable[int], frames: Iterable[int]) -> tuple[str, ...]:

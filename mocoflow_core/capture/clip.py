@@ -28,6 +28,7 @@ class Clip:
     has_mask: NDArray[np.bool_]  # (T,)
     held_out: NDArray[np.bool_]  # (T,)
     background: NDArray[np.uint8]  # (H, W, 3) what is behind the person
+    remarks: tuple[str, ...] = ()  # what had to be guessed or was left out, for the user
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -50,6 +51,7 @@ class Clip:
             "name": self.camera.name,
             "fps": self.fps,
             "camera": self.camera.to_json(),
+            "remarks": self.remarks,
         }
         (folder / "clip.json").write_text(json.dumps(description, indent=1))
 
@@ -72,4 +74,5 @@ class Clip:
             has_mask=array("has_mask"),  # type: ignore[arg-type]
             held_out=array("held_out"),  # type: ignore[arg-type]
             background=array("background"),  # type: ignore[arg-type]
+            remarks=tuple(description.get("remarks", ())),
         )

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from mocoflow_core.capture.background import background_plate, masks_from_plate
+from mocoflow_core.capture.background import (
+    background_plate,
+    covered_share,
+    masks_from_plate,
+    plate_without_masks,
+)
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.capture.composite import BehindPerson, composite_clip
 from mocoflow_core.capture.frame_selection import (
     FrameSelection,
     require_contiguous,
     select_frames,
 )
-from mocoflow_core.capture.frame_source import read_image, read_mask
 from mocoflow_core.capture.repeated_frames import repeated_frames
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.capture.undistort import WorkingView
+from mocoflow_core.capture.working_pictures import working_frames, working_masks, working_plate
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 
@@ -32,7 +36,9 @@ class CaptureConfig(ConfigurationPart):
     train_camera: str | None = Field(
         None, description="Camera to learn from; null: the one that scene.json names."
     )
-    fps: float = Field(12.0, gt=0, description="Working rate; the paper reduces to 12 (sec. 4).")
+    fps: float | None = Field(
+        None, gt=0, description="Working rate; null: the scene's, by default the paper's 12."
+    )
     max_side: int = Field(512, ge=16, description="Longer side of working frames, pixels.")
     held_out_frames: int = Field(
         8, ge=0, description="Source frames between working frames that are kept for scoring."
@@ -56,6 +62,11 @@ class CaptureConfig(ConfigurationPart):
     difference_threshold: int = Field(
         30, ge=1, le=255, description="Difference to the plate that counts as the person, 1/255."
     )
+    behind_person: BehindPerson = Field(
+        "kept",
+        description="What the frames show around the person: what the camera saw, the background "
+        "plate, which removes cast shadows (the paper for AIST), or white (for People-Snapshot).",
+    )
 
 
 class ClipNeeds(ConfigurationPart):
@@ -75,13 +86,15 @@ def extract_clip(
     needs: ClipNeeds = AS_FILES_SAY,
     only: Indices | None = None,
 ) -> Clip:
-    """The train camera's clip. No other camera and no truth is looked at.
+    """The train camera's clip as the camera saw it. No other camera and no truth is looked at.
+
+    ``configuration.behind_person`` is left to ``composite_clip``: frames are judged by what is
+    behind the person before it is replaced.
 
     Args:
         only: source numbers beside which no frame is looked at.
 
-    Raises InputError when frames or masks are missing, when sizes disagree, and when there are
-    neither masks nor a background plate.
+    Raises InputError when frames or masks are missing, and when sizes disagree.
     """
     selection = select_training_frames(scene, configuration, only)
     clip = extract_camera(scene, scene.train_camera, selection, configuration, needs)
@@ -105,7 +118,7 @@ def extract_evaluation(
     """The other cameras' clips: those of the given frames that have a mask to score against.
 
     Only those among ``only``, where it is given. A camera without any such frame is left out. All
-    frames count as held out.
+    frames count as held out. What is behind the person is replaced as in the train camera.
     """
     clips = []
     if only is not None:
@@ -115,7 +128,9 @@ def extract_evaluation(
         scored = np.intersect1d(np.intersect1d(frame_indices, masked), scene.frames(name).indices)
         if len(scored):
             selection = FrameSelection(scored[:0], scored, scene.description.fps)
-            clips.append(extract_camera(scene, name, selection, configuration))
+            seen = extract_camera(scene, name, selection, configuration)
+            behind = configuration.behind_person
+            clips.append(composite_clip(scene, seen, behind, scene.masks(name)))
     return clips
 
 
@@ -130,16 +145,10 @@ def select_training_frames(
     available = scene.frames(name).indices
     require_contiguous(available, f"frames of {name}")
     masks = scene.masks(name)
-    if not masks and scene.background(name) is None:
-        raise InputError(
-            f"{name} must have masks or a background plate",
-            "neither",
-            "Add a mask for each frame, or a picture of the background without the person.",
-        )
     selection = select_frames(
         available,
         scene.description.fps,
-        configuration.fps,
+        configuration.fps or scene.description.working_fps,
         np.array(sorted(masks), np.int32) if masks else available,
         configuration.held_out_frames,
         configuration.holdout_every,
@@ -164,18 +173,29 @@ def extract_camera(
     """The selected frames of any camera, with their masks and what is behind the person."""
     indices = selection.all
     view = WorkingView.of(scene.cameras[name], configuration.max_side)
-    frames = _frames(scene, name, indices, view)
+    frames = working_frames(scene, name, indices, view)
     held_out = np.isin(indices, selection.held_out)
-    plate, mask_files = _given_plate(scene, name, view), scene.masks(name)
+    plate, mask_files = working_plate(scene, name, view), scene.masks(name)
     # Held-out frames must not be trained on, and the plate is part of the training.
     usable = np.flatnonzero(~held_out) if len(selection.working) else np.arange(len(indices))
+    remarks = []
     if mask_files:
-        masks = _masks(mask_files, indices, view)
+        masks = working_masks(mask_files, indices, view)
     else:
-        assert plate is not None
+        if plate is None:
+            plate, _ = _plate(frames, None, usable, configuration)
+            remarks.append(
+                f"{name} has neither masks nor a background picture: the person is what differs "
+                "from the median of its frames, shadows with it"
+            )
         masks = masks_from_plate(frames, plate, configuration.difference_threshold)
     if plate is None or needs.background:
-        plate = _plate(frames, masks, usable, configuration)
+        plate, guessed = _plate(frames, masks, usable, configuration)
+        if guessed:
+            remarks.append(
+                f"the person covers {100 * guessed:.2g} % of the picture of {name} in every "
+                "frame: the background there is filled from around"
+            )
     if needs.masks:
         masks = masks_from_plate(frames, plate, configuration.difference_threshold)
     return Clip(
@@ -187,52 +207,21 @@ def extract_camera(
         has_mask=np.ones(len(indices), bool),
         held_out=held_out,
         background=plate,
+        remarks=tuple(remarks),
     )
-
-
-def _frames(scene: Scene, name: str, indices: Indices, view: WorkingView) -> NDArray[np.uint8]:
-    frames = np.empty((len(indices), view.camera.height, view.camera.width, 3), np.uint8)
-    for row, (number, picture) in enumerate(scene.frames(name).read(indices.tolist())):
-        _require_size(picture, view, f"frame {number} of {name}")
-        frames[row] = view.image(picture)
-    return frames
-
-
-def _masks(files: dict[int, Path], indices: Indices, view: WorkingView) -> Masks:
-    masks = np.empty((len(indices), view.camera.height, view.camera.width), bool)
-    for row, index in enumerate(indices.tolist()):
-        picture = read_mask(files[index])
-        _require_size(picture, view, f"mask {files[index].name} of {view.camera.name}")
-        masks[row] = view.mask(picture)
-    return masks
-
-
-def _given_plate(scene: Scene, name: str, view: WorkingView) -> NDArray[np.uint8] | None:
-    file = scene.background(name)
-    if file is None:
-        return None
-    picture = read_image(file)
-    _require_size(picture, view, f"background of {name}")
-    return view.image(picture)
 
 
 def _plate(
     frames: NDArray[np.uint8],
-    masks: Masks,
+    masks: Masks | None,
     usable: NDArray[np.intp],
     configuration: CaptureConfig,
-) -> NDArray[np.uint8]:
+) -> tuple[NDArray[np.uint8], float]:
+    """The plate of some frames, and the share of it that none of them shows."""
     count = min(len(usable), configuration.background_frames)
     chosen = usable[np.linspace(0, len(usable) - 1, count).round().astype(int)]
     margin_px = round(configuration.background_margin * max(frames.shape[1:3]))
-    return background_plate(frames[chosen], masks[chosen], margin_px)
-
-
-def _require_size(picture: NDArray[np.uint8], view: WorkingView, what: str) -> None:
-    height, width = picture.shape[:2]
-    if (width, height) != (view.source.width, view.source.height):
-        raise InputError(
-            f"{what} must be {view.source.width} x {view.source.height} as scene.json says",
-            f"{width} x {height}",
-            "Give the picture that size, or correct width, height and K together.",
-        )
+    if masks is None:
+        threshold = configuration.difference_threshold
+        return plate_without_masks(frames[chosen], threshold, margin_px), 0.0
+    return background_plate(frames[chosen], masks[chosen], margin_px), covered_share(masks[chosen])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.capture.calibration import require_calibration
 from mocoflow_core.capture.frame_source import (
     FrameSource,
     numbered_images,
@@ -82,9 +83,8 @@ class Scene:
 
     def training_description(self) -> dict[str, Any]:
         """What the training side knows of ``scene.json``: no other camera, no truth, no names."""
-        values = self.description.model_dump(
-            mode="json", include={"format", "version", "fps", "world", "train_camera", "meshes"}
-        )
+        known = {"format", "version", "fps", "working_fps", "world", "train_camera", "meshes"}
+        values = self.description.model_dump(mode="json", include=known)
         camera = self.description.cameras[self.train_camera]
         values |= {"train_camera": self.train_camera, "camera": camera.model_dump(mode="json")}
         # What was estimated for another camera is known to be so.
@@ -156,8 +156,7 @@ def _camera(name: str, part: CameraDescription) -> Camera:
         t=_array(part.t, (3,), f"t of {name}"),
         distortion=_array(part.distortion, (5,), f"distortion of {name}"),
     )
-    _check_rotation(camera)
-    _check_intrinsics(camera)
+    require_calibration(camera, "scene.json")
     return camera
 
 
@@ -174,32 +173,6 @@ def _array(values: object, shape: tuple[int, ...], what: str) -> NDArray[np.floa
     if not np.isfinite(array).all():
         raise InputError(f"{what} must be finite", f"{array.tolist()}", "Correct scene.json.")
     return array
-
-
-# Calibrations are stored with four or more digits; a transposed or scaled matrix is far outside.
-ROTATION_TOLERANCE = 1e-3
-
-
-def _check_rotation(camera: Camera) -> None:
-    error = float(np.abs(camera.R @ camera.R.T - np.eye(3)).max())
-    determinant = float(np.linalg.det(camera.R))
-    if error > ROTATION_TOLERANCE or determinant < 0:
-        raise InputError(
-            f"R of {camera.name} must be a rotation (orthonormal, determinant +1)",
-            f"R R^T off by {error:.3g}, determinant {determinant:.3g}",
-            "Give the world-to-camera rotation in OpenCV axes, without scale or mirror.",
-        )
-
-
-def _check_intrinsics(camera: Camera) -> None:
-    K = camera.K
-    affine = np.allclose(K[2], [0, 0, 1]) and K[1, 0] == 0
-    if not (affine and K[0, 0] > 0 and K[1, 1] > 0):
-        raise InputError(
-            f"K of {camera.name} must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0",
-            f"{K.tolist()}",
-            "Correct K in scene.json.",
-        )
 
 
 def _require_files(scene: Scene) -> None:

@@ -58,6 +58,9 @@ class SceneDescription(_Part):
     version: Literal[1]
     name: str
     fps: float = Field(gt=0, allow_inf_nan=False)
+    working_fps: float = Field(
+        12.0, gt=0, allow_inf_nan=False, description="Rate to learn from; the paper's (sec. 4)."
+    )
     world: WorldDescription
     train_camera: str
     cameras: dict[str, CameraDescription]

@@ -25,6 +25,15 @@ class VideoDescription:
     frame_count: int  # packets in the stream; a damaged file may decode to fewer
 
 
+@dataclass(frozen=True)
+class DecodedVideo:
+    """What decoding to the end finds."""
+
+    frame_count: int
+    width: int  # of the upright picture
+    height: int
+
+
 def describe_video(path: Path) -> VideoDescription:
     """Rate and number of frames, without decoding.
 
@@ -37,6 +46,25 @@ def describe_video(path: Path) -> VideoDescription:
             return VideoDescription(float(stream.average_rate or 0.0), count)
     except av.FFmpegError as error:
         raise _undecodable(path, error.strerror or str(error)) from error
+
+
+def decode_to_the_end(path: Path) -> DecodedVideo:
+    """Count the frames that decode, where a container's own count cannot be relied on.
+
+    Raises InputError when the file is no video, holds no frame, or is damaged on the way.
+    """
+    count, width, height = 0, 0, 0
+    try:
+        with av.open(str(path)) as container:
+            for frame in container.decode(_video_stream(container, path)):
+                if not count:
+                    height, width = _upright(frame).shape[:2]
+                count += 1
+    except av.FFmpegError as error:
+        raise _undecodable(path, error.strerror or str(error)) from error
+    if not count:
+        raise _undecodable(path, "no frame")
+    return DecodedVideo(count, width, height)
 
 
 def read_frames(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, Image]]:

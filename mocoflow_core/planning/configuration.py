@@ -34,6 +34,9 @@ class PlanConfig(ConfigurationPart):
     trusted_overlap: float = Field(
         0.6, ge=0, le=1, description="Silhouette overlap from which a given location is trusted."
     )
+    faint_shadow: float = Field(
+        0.05, ge=0, description="Moving shadows up to this share of the person's area are faint."
+    )
     still_px: float = Field(
         0.5, ge=0, description="A body whose points move less than this, in pixels, is still."
     )

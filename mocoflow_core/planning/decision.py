@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, field_validator
@@ -36,3 +37,15 @@ class Decision(BaseModel):
             return self
         reason = f"forced {force} by the configuration; measured: {self.reason}"
         return self.model_copy(update={"needed": force == "on", "reason": reason})
+
+
+def with_evidence(
+    decisions: Iterable[Decision], name: str, measured: Mapping[str, float]
+) -> tuple[Decision, ...]:
+    """The decisions, the named one with what was measured while it was carried out."""
+    return tuple(
+        decision.model_copy(update={"evidence": decision.evidence | dict(measured)})
+        if decision.name == name
+        else decision
+        for decision in decisions
+    )

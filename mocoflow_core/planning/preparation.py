@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mocoflow_core.capture.composite import BehindPerson
 from mocoflow_core.errors import InputError
 from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.decision import Decision
@@ -77,6 +78,31 @@ def decide_frames(repeated: int, kept: int, configuration: PlanConfig) -> Decisi
         threshold=1.0,
         saves="up to 0.3 s for each frame in location, repair and motion",
     ).forced(configuration.repeated_frames)
+
+
+def decide_shadows(
+    shadowed: float, behind_person: BehindPerson, configuration: PlanConfig
+) -> Decision:
+    """Whether cast shadows are removed: ``capture.behind_person`` decides, the evidence advises.
+
+    ``shadowed``: area in a shadow that the plate does not have, in sizes of the person.
+    """
+    reason = {
+        "kept": "what is behind the person stays as the camera saw it",
+        "plate": "the person is set before the background plate",
+        "white": "the person is set before white",
+    }[behind_person]
+    if behind_person == "kept" and shadowed > configuration.faint_shadow:
+        reason += ", moving shadows with it; capture.behind_person=plate removes them"
+    return Decision(
+        name="shadow_removal",
+        part="preparation",
+        needed=behind_person != "kept",
+        reason=reason,
+        evidence={"shadowed": shadowed},
+        threshold=configuration.faint_shadow,
+        saves="reading every frame a second time",
+    )
 
 
 def decide_location(inspection: Inspection, configuration: PlanConfig) -> Decision:

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.body.ingest import IngestedMeshes, ingest_meshes
+from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.body.mesh_checks import UNIT_SIZES_M
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.signed_distance import signed_distance_lattice
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.stability.case import Case, Found, largest, require
 from mocoflow_core.stability.figures import torso_and_arm
 from mocoflow_core.stability.toy_scene import SCHEDULE, filmed, prepare, recorded, train

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rigid_controls import rigid_controls
 from mocoflow_core.body.silhouette import silhouette
@@ -15,6 +14,7 @@ from mocoflow_core.capture.checks import check_capture
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.rays import pixel_rays
 from mocoflow_core.rendering.pixels import shell_pixels

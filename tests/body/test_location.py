@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mocoflow_core.body.ingest import IngestedMeshes
-from mocoflow_core.body.location import LocatedMeshes, LocationConfig, locate_body
+from mocoflow_core.body.located_meshes import LocatedMeshes
+from mocoflow_core.body.location import LocationConfig, locate_body
 from mocoflow_core.body.silhouette import silhouettes
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
@@ -100,6 +101,7 @@ def test_frames_without_a_person_are_interpolated(masks):
     located = locate_body(clip_of(gaps), root_centred(), LocationConfig())
     lateral, depth = errors_m(located)
     assert (located.confidence[3:5] == 0).all()
+    assert located.quality["least_confidence"] > 0.3
     assert np.isnan(located.residual[3:5]).all()
     assert lateral.max() < 0.05
     assert depth.max() < 0.1
@@ -123,6 +125,72 @@ def test_masks_cut_by_the_border_count_little(masks):
     # The mask shows a body that is cut and 68 pixels, 1.4 m, lower; a tenth of that is believed.
     assert errors_m(located)[0][3] < 0.14
     assert f"1 of {FRAMES} masks" in located.warnings[0]
+
+
+def _half(mask):
+    upper = mask.copy()
+    upper[np.flatnonzero(mask.any(axis=1)).mean().astype(int) :] = False
+    return upper
+
+
+def _blob(mask):
+    rows, columns = np.indices(mask.shape)
+    return (rows - 30) ** 2 + (columns - 20) ** 2 < 15**2
+
+
+def located_at(meshes, masks) -> tuple[LocatedMeshes, np.ndarray]:
+    """Root-centred bodies searched against their masks, and the errors (T, 3), metres."""
+    in_camera = CAMERA.to_camera(meshes.vertices.astype(float))
+    roots = in_camera.mean(axis=1)
+    bodies = replace(meshes, vertices=(in_camera - roots[:, None]).astype(np.float32))
+    clip = replace(
+        clip_of(masks), frame_indices=meshes.frame_indices, has_mask=np.ones(len(masks), bool)
+    )
+    coarse = LocationConfig(grid_px=64, outline_px=192)
+    located = locate_body(clip, IngestedMeshes(bodies, "camera-root-centred", False), coarse)
+    return located, np.abs(located.translations - roots)
+
+
+def test_masks_that_show_something_else_do_not_move_the_body():
+    meshes = walking(14)
+    masks = silhouettes(meshes.vertices, meshes.faces, CAMERA)
+    for row, wrong in ((4, np.logical_not), (9, _half), (10, _blob)):
+        masks[row] = wrong(masks[row])
+    located, error = located_at(meshes, masks)
+    assert error[:, :2].max() < 0.03
+    assert error[:, 2].max() < 0.08
+    assert located.confidence[[4, 10]].max() < 0.05
+    assert located.confidence[9] < 0.5 * np.median(located.confidence)
+    assert "2 frames (4, 10)" in located.warnings[-1]
+
+
+def test_a_person_who_walks_out_of_the_picture_is_followed():
+    """The border cuts up to half of the body in the last third of the clip."""
+    count = 12
+    places = np.zeros((count, 3))
+    places[:, 0] = 1.4 * np.clip(np.linspace(-1, 1, count), 0, None)
+    meshes = capsule_person(np.linspace(0, 1, count), np.zeros(count), places)
+    masks = silhouettes(meshes.vertices, meshes.faces, CAMERA)
+    whole = masks.sum(axis=(1, 2))
+    assert whole[-1] < 0.6 * whole[0]
+    located, error = located_at(meshes, masks)
+    assert error[:, :2].max() < 0.03
+    assert error[:, 2].max() < 0.12
+    assert located.confidence[-1] < 0.3 * located.confidence[0]
+    assert "cut by the image border" in located.warnings[0]
+
+
+def test_a_first_translation_leads_where_the_mask_alone_misleads(masks):
+    """Two people in every mask: the box says one large person between them."""
+    both = masks[:1] | np.roll(masks[:1], 45, axis=2)
+    bodies = root_centred_first(1)
+    near = ROOTS[:1] + np.array([0.05, -0.05, 0.1])
+    alone = locate_body(clip_of(both), bodies, LocationConfig())
+    led = locate_body(clip_of(both), replace(bodies, first_translations=near), LocationConfig())
+    assert errors_m(led)[1][0] < 0.25 < errors_m(alone)[1][0]
+    unknown = replace(bodies, first_translations=np.full((1, 3), np.nan))
+    untold = locate_body(clip_of(both), unknown, LocationConfig())
+    assert np.array_equal(untold.translations, alone.translations)
 
 
 def test_a_clip_of_cut_masks_alone_is_still_located():

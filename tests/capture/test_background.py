@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocoflow_core.capture.background import background_plate, masks_from_plate
+from mocoflow_core.capture.background import (
+    background_plate,
+    covered_share,
+    masks_from_plate,
+    plate_without_masks,
+)
 from tests.capsule_person import room
 
 
@@ -42,6 +47,34 @@ def test_what_is_never_seen_is_filled_from_around():
     masks[:, 8:12, 8:12] = True
     frames[masks] = 255
     assert np.abs(background_plate(frames, masks, 0).astype(int) - 100).max() <= 2
+
+
+def test_a_person_who_covers_a_pixel_most_of_the_time_leaves_no_trace():
+    plate = room(24, 24)
+    masks = np.zeros((10, 24, 24), bool)
+    masks[:6, 6:18, 8:16] = True
+    frames = np.where(masks[..., None], np.uint8([250, 5, 5]), plate)
+    assert np.array_equal(background_plate(frames, masks, 2), plate)
+    assert covered_share(masks) == 0
+    masks[6:, 10, 10] = True
+    assert covered_share(masks) == 1 / 24**2
+
+
+def test_without_masks_what_passes_by_does_not_even_bias_the_plate():
+    random = np.random.default_rng(0)
+    steps, size = 15, 40
+    plate = room(size, size).astype(float)
+    frames = plate + random.normal(0, 6, (steps, size, size, 3))
+    # Each pixel of the middle is covered by something bright in 6 of the 15 frames.
+    for column in range(size):
+        covered = (column // 2 + np.arange(6)) % steps
+        frames[covered, 8:32, column] = 250
+    frames = frames.clip(0, 255).astype(np.uint8)
+    inside = np.s_[8:32]
+    plain = np.median(frames, axis=0)[inside] - plate[inside]
+    made = plate_without_masks(frames, 30, 0)[inside] - plate[inside]
+    assert plain.mean() > 3
+    assert abs(made.mean()) < 1
 
 
 def test_masks_from_the_plate_are_the_person():

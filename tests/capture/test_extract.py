@@ -22,6 +22,8 @@ from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.video import write_video
 from tests.capsule_person import (
+    SceneRecipe,
+    capsule_person,
     default_recipe,
     edit_description,
     look_at,
@@ -143,9 +145,27 @@ def test_a_plate_without_masks_gives_the_masks(tmp_path):
     assert overlap(bodies, clip.masks).min() > 0.95
 
 
-def test_neither_masks_nor_plate_is_refused(tmp_path):
-    folder = write_scene(tmp_path, replace(default_recipe(), masks=False, background=False))
-    assert "masks or a background plate" in refusal(folder)
+def test_neither_masks_nor_plate_makes_both_of_what_moves_and_says_so(tmp_path):
+    meshes = capsule_person(np.zeros(16), np.zeros(16), np.linspace([-1.6, 0, 0], [1.6, 0, 0], 16))
+    camera = look_at([0, -3.5, 1.2], [0, 0, 0.9], 70, 128, 96, "cam00")
+    recipe = SceneRecipe(meshes, {"cam00": camera}, masks=False, background=False)
+    clip = extracted(write_scene(tmp_path, recipe))
+    assert np.array_equal(clip.background, room(128, 96, 0))
+    bodies = silhouettes(meshes.vertices, meshes.faces, clip.camera)
+    assert overlap(bodies, clip.masks).min() > 0.9
+    assert "neither masks nor a background" in clip.remarks[0]
+
+
+def test_a_plate_that_had_to_be_guessed_somewhere_says_how_much(tmp_path):
+    turning = capsule_person(np.linspace(0, 1, 6), np.zeros(6), np.zeros((6, 3)))
+    recipe = replace(default_recipe(), meshes=turning, background=False)
+    clip = extracted(write_scene(tmp_path, recipe))
+    share = 100 * clip.masks.all(axis=0).mean()
+    assert share > 1
+    [remark] = clip.remarks
+    assert f"covers {share:.2g} % of the picture" in remark
+    clip.save(tmp_path)
+    assert Clip.load(tmp_path).remarks == clip.remarks
 
 
 def test_masks_of_another_size_are_refused(folder):

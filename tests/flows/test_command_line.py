@@ -166,6 +166,14 @@ def test_a_missing_mesh_file_is_refused(refuse, toy_scene, tmp_path):
     )
 
 
+def test_a_missing_body_model_is_refused(refuse, toy_scene, tmp_path):
+    refuse("plan", toy_scene, "--body-model", tmp_path / "no.pkl", because="--body-model")
+
+
+def test_a_person_of_meshes_without_people_is_bad_input(toy_scene, refuse_inside_the_flow):
+    refuse_inside_the_flow(toy_scene, "meshes.person needs", settings=("meshes.person=3",))
+
+
 @pytest.fixture
 def refuse_inside_the_flow(reconstruct, tmp_path):
     """Runs the flow in this process, which is quicker: the same error, before it gets printed."""

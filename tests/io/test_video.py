@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.video import describe_video, read_frames, write_video
+from mocoflow_core.io.video import decode_to_the_end, describe_video, read_frames, write_video
+from tests.lossless_video import write_lossless
 
 
 def numbered(count=12, height=32, width=48):
@@ -79,3 +80,23 @@ def test_a_frame_beyond_the_end_is_refused(video):
 def test_a_video_needs_a_frame(tmp_path):
     with pytest.raises(ValueError, match="at least one frame"):
         write_video(tmp_path / "empty.mp4", [], 12)
+
+
+def test_frames_are_counted_by_decoding_where_the_container_says_more(tmp_path):
+    path = tmp_path / "cut.avi"
+    noise = np.random.default_rng(0).integers(0, 255, (12, 32, 48, 3), np.uint8)
+    write_lossless(path, noise)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 6 // 10])
+    with av.open(str(path)) as container:
+        assert container.streams.video[0].frames == 12
+    decoded = decode_to_the_end(path)
+    assert decoded.frame_count == 7
+    assert (decoded.width, decoded.height) == (48, 32)
+    assert len(list(read_frames(path, range(7)))) == 7
+
+
+def test_a_video_that_breaks_off_inside_a_frame_is_refused(tmp_path, video):
+    broken = tmp_path / "broken.mp4"
+    broken.write_bytes(video.read_bytes()[:-200])
+    with pytest.raises(InputError, match="must be a video"):
+        decode_to_the_end(broken)

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.planning.inspection import Inspection, inspect_scene
 from tests.capsule_person import (
     capsule_person,

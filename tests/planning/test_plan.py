@@ -8,12 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
-from mocoflow_core.body.ingest import ingest_meshes
 from mocoflow_core.body.repair import RepairConfig, RoundsConfig
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.planning.configuration import PlanConfig
+from mocoflow_core.planning.decision import with_evidence
 from mocoflow_core.planning.inspection import inspect_scene
 from mocoflow_core.planning.plan import ScenePlan, plan_scene
 from mocoflow_core.planning.preparation import (
@@ -22,6 +23,7 @@ from mocoflow_core.planning.preparation import (
     decide_location,
     decide_preparation,
     decide_segmentation,
+    decide_shadows,
 )
 from mocoflow_core.planning.repair import repair_where_needed
 from mocoflow_core.planning.scoring import decide_evaluation
@@ -32,6 +34,7 @@ DECISIONS = [
     "mask_segmentation",
     "location_search",
     "repeated_frames",
+    "shadow_removal",
     "body_repair",
     "motion_fields",
     "motion_residual",
@@ -56,6 +59,7 @@ def planned(folder, change_meshes=lambda meshes: meshes, change_clip=lambda clip
     preparation = (
         *decide_preparation(inspect_scene(scene, ingested), chosen),
         decide_frames(0, len(clip.frames), chosen),
+        decide_shadows(0.0, "kept", chosen),
         repair_where_needed(clip, meshes, QUICK, chosen.body_repair, lambda share, text: None)[1],
     )
     return plan_scene(clip, meshes, preparation, chosen)
@@ -122,8 +126,10 @@ def test_changing_light_needs_appearance_codes(folder):
 
 @pytest.mark.parametrize("force", ["on", "off"])
 def test_every_decision_can_be_forced(folder, force):
-    plan = planned(folder, **dict.fromkeys(DECISIONS, force))
-    for name in DECISIONS:
+    # Shadows have a setting of their own, capture.behind_person.
+    names = [name for name in DECISIONS if name != "shadow_removal"]
+    plan = planned(folder, **dict.fromkeys(names, force))
+    for name in names:
         assert plan.needs(name) == (force == "on")
         assert f"forced {force}" in plan.decision(name).reason
 
@@ -279,3 +285,22 @@ def test_repeated_frames_are_counted_in_the_evidence():
     assert decision.reason == "3 of 12 frames repeat another one"
     assert decision.evidence == {"repeated": 3.0, "kept": 9.0}
     assert decide_frames(0, 12, PlanConfig(repeated_frames="on")).needed
+
+
+def test_shadow_removal_is_what_the_configuration_says_with_what_was_measured():
+    kept, plate, faint = (
+        decide_shadows(shadowed, behind, PlanConfig())
+        for shadowed, behind in ((0.4, "kept"), (0.4, "plate"), (0.01, "kept"))
+    )
+    assert (kept.needed, plate.needed) == (False, True)
+    assert kept.evidence == plate.evidence == {"shadowed": 0.4}
+    assert "capture.behind_person=plate removes them" in kept.reason
+    assert "shadow" not in faint.reason
+
+
+def test_what_a_search_measured_stands_beside_the_decision_to_search(folder):
+    inspection = inspect_scene(open_scene(folder), None)
+    before = decide_preparation(inspection, PlanConfig())
+    after = with_evidence(before, "location_search", {"residual": 0.1})
+    assert [b != a for b, a in zip(before, after, strict=True)] == [False, False, True]
+    assert after[-1].evidence["residual"] == 0.1

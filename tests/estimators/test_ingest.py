@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
-from mocoflow_core.body.ingest import IngestedMeshes, ingest_meshes
+from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.configuration import EstimateConfig
+from mocoflow_core.estimators.ingest import ingest_meshes
 from tests.capsule_person import default_recipe, edit_description, write_scene
+from tests.estimators.layouts import write_people, write_wham
 
 MESHES = default_recipe().meshes
 
@@ -206,3 +210,97 @@ def test_ingested_meshes_survive_saving(folder, tmp_path):
         before.located,
         before.warnings,
     )
+
+
+def test_first_translations_survive_saving(folder, tmp_path):
+    first = np.arange(3.0 * len(MESHES.vertices)).reshape(-1, 3)
+    first[1] = np.nan
+    (tmp_path / "saved").mkdir()
+    replace(ingested(folder), first_translations=first).save(tmp_path / "saved")
+    loaded = IngestedMeshes.load(tmp_path / "saved")
+    assert np.array_equal(loaded.first_translations, first, equal_nan=True)
+
+
+def weak_vibe(frames, camera) -> tuple[dict, np.ndarray]:
+    """The scene's bodies as VIBE stores them, of these frames, and their weak translations."""
+    in_camera = camera.to_camera(MESHES.vertices[frames].astype(float))
+    middles = in_camera.mean(axis=1)
+    scale_px = camera.K[0, 0] / middles[:, 2]
+    side = np.full(len(frames), 80.0)
+    centre = camera.project(camera.to_world(middles))
+    cam = np.column_stack([2 * scale_px / (1.1 * side), np.zeros((len(frames), 2))])
+    verts = (in_camera - middles[:, None]).astype(np.float32)
+    boxes = np.column_stack([centre, side, side])
+    record = {"pred_cam": cam, "bboxes": boxes, "verts": verts, "frame_ids": np.array(frames)}
+    return record, middles
+
+
+@pytest.fixture
+def faces(tmp_path):
+    MESHES.save(tmp_path / "faces.npz")
+    return EstimateConfig(faces=tmp_path / "faces.npz")
+
+
+def test_an_estimators_file_is_placed_in_the_scene_and_its_gap_is_bridged(folder, tmp_path, faces):
+    camera = default_recipe().cameras["cam00"]
+    record, places = weak_vibe([0, 1, 3, 4, 5], camera)
+    path = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    result = ingest_meshes(open_scene(folder), path, faces)
+    assert (result.coordinates, result.located) == ("camera-root-centred", False)
+    assert result.meshes.frame_indices.tolist() == [0, 1, 2, 3, 4, 5]
+    known = np.delete(result.first_translations, 2, axis=0)
+    assert np.allclose(known, places, atol=1e-5)
+    assert np.allclose(result.first_translations[2], (places[1] + places[2]) / 2, atol=1e-5)
+    assert any("1 frames without a mesh" in warning for warning in result.warnings)
+
+
+def test_an_estimate_in_the_cameras_axes_is_brought_to_the_world(folder, tmp_path, faces):
+    scene = open_scene(folder)
+    camera = scene.cameras["cam00"]
+    verts = camera.to_camera(MESHES.vertices.astype(float)).astype(np.float32)
+    record = {"verts_cam": verts, "frame_id": np.arange(6), "trans_world": np.zeros((6, 3))}
+    path = write_wham(tmp_path / "wham_output.pkl", {0: record})
+    chosen = faces.model_copy(update={"focal_px": float(camera.K[0, 0])})
+    result = ingest_meshes(scene, path, chosen)
+    assert (result.coordinates, result.located) == ("world", False)
+    assert np.allclose(result.meshes.vertices, MESHES.vertices, atol=1e-5)
+
+
+def test_positions_count_from_the_first_frame_of_the_video(folder, tmp_path, faces):
+    for kind in ("frames", "masks"):
+        for camera in ("cam00", "cam01"):
+            where = folder / kind / camera
+            for number in reversed(range(6)):
+                (where / f"{number:06d}.png").rename(where / f"{number + 30:06d}.png")
+    record, _ = weak_vibe(list(range(6)), default_recipe().cameras["cam00"])
+    path = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    result = ingest_meshes(open_scene(folder), path, faces)
+    assert result.meshes.frame_indices.tolist() == [30, 31, 32, 33, 34, 35]
+
+
+@pytest.mark.parametrize("frames", [range(5), range(7)])
+def test_an_estimate_of_another_number_of_frames_is_refused(folder, tmp_path, faces, frames):
+    rows = [min(frame, 5) for frame in frames]
+    record, _ = weak_vibe(rows, default_recipe().cameras["cam00"])
+    record["frame_ids"] = np.array(frames)
+    path = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    with pytest.raises(InputError, match=f"{len(rows)} meshes for 6 frames"):
+        ingest_meshes(open_scene(folder), path, faces)
+
+
+def test_a_scene_may_name_an_estimators_file_itself(folder, tmp_path, faces):
+    record, _ = weak_vibe(list(range(6)), default_recipe().cameras["cam00"])
+    write_people(folder / "vibe_output.pkl", {1: record})
+    edit_description(folder, lambda d: d["meshes"].update(file="vibe_output.pkl"))
+    assert ingest_meshes(open_scene(folder), None, faces).coordinates == "camera-root-centred"
+
+
+def test_a_folder_of_meshes_stands_where_the_scene_says(folder, tmp_path):
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    for number, body in zip(MESHES.frame_indices, MESHES.vertices, strict=True):
+        Trimesh(body, MESHES.faces, process=False).export(meshes / f"{number}.ply")
+    result = ingest_meshes(open_scene(folder), meshes)
+    assert (result.coordinates, result.located) == ("world", True)
+    assert np.array_equal(result.meshes.vertices, MESHES.vertices)
+    assert "the world" in result.warnings[0]

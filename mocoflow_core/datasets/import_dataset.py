@@ -1,0 +1,81 @@
+"""From a data set on disk to a native scene folder, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.datasets.dataset_checks import check_dataset
+from mocoflow_core.datasets.kinds import DatasetKind
+from mocoflow_core.datasets.write_dataset import require_new, write_dataset
+from mocoflow_core.errors import InputError
+from mocoflow_core.settings import with_settings
+
+Progress = Callable[[float, str], None]
+# Counts up when the same files give another scene folder.
+ALGORITHM_VERSION = 1
+
+
+@dataclass(frozen=True)
+class ImportedDataset:
+    """What was assumed, measured and found unusual, in words and numbers."""
+
+    name: str
+    train_camera: str
+    remarks: tuple[str, ...]
+    measured: dict[str, float]
+    warnings: tuple[str, ...]
+
+    @property
+    def of_train_camera(self) -> dict[str, float]:
+        """What was measured of the scene as a whole and of the camera that is learned from."""
+        return {
+            name: value
+            for name, value in self.measured.items()
+            if " of " not in name or name.endswith(f" of {self.train_camera}")
+        }
+
+
+def configure(
+    kind: DatasetKind, settings: Sequence[str], body_model: Path | None
+) -> ConfigurationPart:
+    """The kind's configuration with settings applied. Raises InputError for unknown ones."""
+    chosen = with_settings(kind.configuration(), settings)
+    if body_model is None:
+        return chosen
+    if "body_model" not in kind.configuration.model_fields:
+        raise InputError(
+            f"no body model for {kind.name}", str(body_model), "Leave --body-model out."
+        )
+    return chosen.model_copy(update={"body_model": body_model})
+
+
+def import_dataset(
+    kind: DatasetKind,
+    source: Path,
+    configuration: ConfigurationPart,
+    out: Path,
+    progress: Progress | None = None,
+) -> ImportedDataset:
+    """Read, check, and write as a scene folder, which appears whole or not at all.
+
+    Raises InputError as the reader and the checks do, for a folder with content, and a full disk.
+    """
+    require_new(out)
+    scene = kind.read(source, configuration)
+    findings = check_dataset(scene)
+    imported = ImportedDataset(
+        scene.name, scene.train_camera, scene.remarks, findings.measured, findings.warnings
+    )
+    record = {
+        "kind": kind.name,
+        "source": str(source.resolve()),
+        "configuration": configuration.model_dump(mode="json"),
+        "remarks": imported.remarks,
+        "measured": imported.measured,
+        "warnings": imported.warnings,
+    }
+    write_dataset(scene, out, record, progress)
+    return imported

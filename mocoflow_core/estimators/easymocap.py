@@ -1,0 +1,133 @@
+"""EasyMocap's and ZJU-MoCap's parameters: SMPL bodies turned about the world's origin.
+
+A folder with a file per frame, ``<i>.npy`` (one person) or ``<i>.json`` (a list of people), or one
+of them. Layout: zju3dv/EasyMocap, doc/02_output.md; zju3dv/neuralbody, INSTALL.md.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from mocoflow_core.body.blend_skinning import posed_vertices
+from mocoflow_core.body.smpl_model import SmplModel
+from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.bodies import shapes_of
+from mocoflow_core.estimators.estimate import BodyEstimate
+from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
+from mocoflow_core.estimators.tracks import Track, choose_track
+
+Array = NDArray[np.float64]
+
+TOOL = "EasyMocap"
+PARTS = ("Rh", "Th", "poses", "shapes")
+# Neural Body's folder of bodies that were fitted without pose blend shapes.
+WITHOUT_BLEND_SHAPES = "params"
+
+
+def recognises(stored: Stored) -> bool:
+    """Records of one frame, or a folder of them."""
+    if not stored.is_folder:
+        return bool(_records(stored.content))
+    files = stored.files(".npy", ".json")
+    return any(_records(read_stored(file)) for file in files)
+
+
+def read(stored: Stored, known: Known) -> BodyEstimate:
+    """One person in the world of the calibration. Raises InputError without the SMPL model."""
+    track, chosen = choose_track(_tracks(stored), known.chosen.person)
+    model = known.require_model(TOOL, "SMPL")
+    shape, remarks = shapes_of(track.rows("shapes"), known)
+    with_blend_shapes = known.chosen.pose_blend_shapes == "on"
+    if stored.path.name == WITHOUT_BLEND_SHAPES and with_blend_shapes:
+        remarks = (
+            *remarks,
+            "a folder called params was fitted without pose blend shapes in Neural Body's release: "
+            "then set meshes.pose_blend_shapes=off, or give new_params",
+        )
+    vertices = turned_bodies(
+        model,
+        track.floats("poses", 24, 3),
+        shape,
+        track.floats("Rh", 3),
+        track.floats("Th", 3),
+        with_blend_shapes,
+    )
+    return BodyEstimate(
+        source=TOOL,
+        frame_indices=track.frame_indices,
+        numbering="source",
+        vertices=vertices.astype(np.float32),
+        faces=model.faces.astype(np.int32),
+        coordinates="world",
+        located=True,
+        remarks=(*chosen, *remarks),
+    )
+
+
+def turned_bodies(
+    model: SmplModel,
+    poses: Array,
+    shape: Array,
+    Rh: Array,
+    Th: Array,
+    pose_blend_shapes: bool = True,
+) -> Array:
+    """Bodies (T, V, 3) in world metres: ``R(Rh) SMPL(poses, shape) + Th``, about the origin.
+
+    Args:
+        poses: (T, 24, 3) axis-angle, the first usually zero.
+        shape: (S,) or (T, S).
+        Rh, Th: (T, 3) axis-angle and metres.
+        pose_blend_shapes: whether the bodies were fitted with them.
+    """
+    bodies = posed_vertices(model, poses, shape, pose_directions=pose_blend_shapes)
+    turns = Rotation.from_rotvec(Rh).as_matrix()
+    return np.einsum("tij,tvj->tvi", turns, bodies) + Th[:, None]
+
+
+def _records(content: object) -> list[Mapping[str, object]]:
+    """The people of one frame; empty for what is none."""
+    if isinstance(content, Mapping) and "annots" in content:
+        content = content["annots"]
+    records = content if isinstance(content, list) else [content]
+    found = [one for one in records if isinstance(one, Mapping) and set(one) >= set(PARTS)]
+    return found if len(found) == len(records) else []
+
+
+def _tracks(stored: Stored) -> list[Track]:
+    files = stored.files(".npy", ".json") if stored.is_folder else [stored.path]
+    rows: dict[int | None, list[tuple[int, Mapping[str, object]]]] = defaultdict(list)
+    for number, file in zip(frame_numbers(file.name for file in files), files, strict=True):
+        content = read_stored(file)
+        records = _records(content)
+        if not records and not (isinstance(content, list) and not content):
+            raise InputError(
+                f"files of EasyMocap with {', '.join(PARTS)}", f"{file.name}", "Remove other files."
+            )
+        for record in records:
+            rows[_id(record)].append((number, record))
+    return [_track(person, found) for person, found in rows.items()]
+
+
+def _id(record: Mapping[str, object]) -> int | None:
+    given = record.get("id")
+    return None if given is None else int(np.asarray(given).ravel()[0])
+
+
+def _track(person: int | None, rows: list[tuple[int, Mapping[str, object]]]) -> Track:
+    frames = np.array([number for number, _ in rows], np.int32)
+    arrays = {}
+    for part in PARTS:
+        values = [np.asarray(record[part], np.float64).ravel() for _, record in rows]
+        if len({len(value) for value in values}) > 1:
+            raise InputError(
+                f"{part} of the same size in all frames", "several sizes", "Fit the frames again."
+            )
+        arrays[part] = np.stack(values)
+    return Track(person, frames, arrays)

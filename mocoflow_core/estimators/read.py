@@ -1,0 +1,62 @@
+"""From a path to one person's bodies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.configuration import EstimateConfig, Kind
+from mocoflow_core.estimators.detect import detect
+from mocoflow_core.estimators.estimate import BodyEstimate
+from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.readers import READERS
+from mocoflow_core.estimators.stored import Stored
+
+# Read by all kinds, or by whoever has a use for them: files lie ready for several scenes.
+_ALWAYS = {"kind", "body_model", "faces"}
+
+
+def read_estimate(path: Path, known: Known) -> BodyEstimate:
+    """The bodies that a tool's file or folder holds, for one person.
+
+    Raises InputError for unknown or damaged content, for a person who is not in it, for a body
+    model that is needed and not given, and for settings that its kind does not read.
+    """
+    stored = Stored(path)
+    kind = detect(stored) if known.chosen.kind == "auto" else known.chosen.kind
+    _require_read(known.chosen, kind)
+    try:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            estimate = READERS[kind].read(stored, known)
+    except InputError:
+        raise
+    # Whatever arrays of another size, type or nesting than the tool's lead to.
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"an estimate as {READERS[kind].title} writes it",
+            f"other arrays in {path.name} ({type(error).__name__}: {str(error).splitlines()[:1]})",
+            "Write the estimate again.",
+        ) from error
+    if not known.chosen.first_frame:
+        return estimate
+    later = (estimate.frame_indices + known.chosen.first_frame).astype(np.int32)
+    return replace(estimate, frame_indices=later)
+
+
+def _require_read(chosen: EstimateConfig, kind: Kind) -> None:
+    """Raise InputError for a setting that the kind would ignore."""
+    default = EstimateConfig()
+    for name in type(chosen).model_fields:
+        if name in _ALWAYS | READERS[kind].fields or getattr(chosen, name) == getattr(
+            default, name
+        ):
+            continue
+        readers = [other.title for other in READERS.values() if name in other.fields]
+        raise InputError(
+            f"meshes.{name} needs an estimate that reads it ({'; '.join(readers)})",
+            f"one of {READERS[kind].title}",
+            f"Leave meshes.{name} out.",
+        )

@@ -1,0 +1,108 @@
+"""ZJU-MoCap and AIST folders are recognised, imported whole, and ready to be learned from."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.capture.extract import CaptureConfig, extract_clip, extract_evaluation
+from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.datasets.detect import detect_kind
+from mocoflow_core.datasets.import_dataset import configure, import_dataset
+from mocoflow_core.errors import InputError
+from tests.datasets.aist_layout import write_aist
+from tests.datasets.studio import Y_UP, Z_DOWN, studio
+from tests.datasets.zju_layout import write_faces, write_zju
+
+FRAMES = 20
+
+
+@pytest.fixture(scope="module")
+def zju(tmp_path_factory):
+    """The studio, its layout on disk, and the scene folder made of it by detection."""
+    filmed = studio(("Camera_B1", "Camera_B2", "Camera_B3"), Z_DOWN, frames=FRAMES)
+    folder = tmp_path_factory.mktemp("zju")
+    source = write_zju(folder / "CoreView_377", filmed)
+    faces = write_faces(folder / "smpl.obj", filmed)
+    return filmed, source, imported(source, folder / "scene", f"faces={faces}")
+
+
+@pytest.fixture(scope="module")
+def aist(tmp_path_factory):
+    filmed = studio(("c01", "c03", "c09"), Y_UP, frames=FRAMES)
+    folder = tmp_path_factory.mktemp("aist")
+    source = write_aist(folder / "aist", filmed, None)
+    return filmed, source, imported(source, folder / "scene", "bodies=none", "train_camera=c01")
+
+
+def imported(source, out, *settings):
+    kind = detect_kind(source)
+    import_dataset(kind, source, configure(kind, settings, None), out)
+    return open_scene(out)
+
+
+def test_each_is_recognised(zju, aist):
+    assert detect_kind(zju[1]).name == "zju-mocap"
+    assert detect_kind(aist[1]).name == "aist"
+
+
+def test_a_folder_of_subjects_and_a_look_alike_are_told(zju, tmp_path):
+    with pytest.raises(InputError, match="CoreView_377"):
+        detect_kind(zju[1].parent)
+    (tmp_path / "annots_new.npy").touch()
+    with pytest.raises(InputError, match="refined release"):
+        detect_kind(tmp_path)
+
+
+@pytest.mark.parametrize("which", ["zju", "aist"])
+def test_the_scene_has_the_cameras_that_filmed(which, request):
+    filmed, _, scene = request.getfixturevalue(which)
+    assert set(scene.cameras) == set(filmed.cameras)
+    for name, camera in filmed.cameras.items():
+        for part in ("K", "R", "t"):
+            found = getattr(scene.cameras[name], part)
+            np.testing.assert_allclose(found, getattr(camera, part), atol=1e-9)
+
+
+def test_the_clip_of_zju_is_white_around_the_person_at_12_per_second(zju):
+    filmed, _, scene = zju
+    clip = extract_clip(scene, CaptureConfig())
+    assert clip.fps == 12
+    assert clip.frame_indices[~clip.held_out].tolist() == list(range(0, FRAMES, 2))
+    np.testing.assert_array_equal(clip.masks, filmed.masks["Camera_B1"][clip.frame_indices])
+    assert (clip.frames[~clip.masks] == 255).all()
+    assert (clip.background == 255).all()
+    bodies = MeshSequence.load(scene.meshes())
+    np.testing.assert_allclose(bodies.vertices, filmed.meshes.vertices, atol=1e-5)
+
+
+def test_the_clip_of_aist_stands_before_its_plate_at_12_per_second(aist):
+    _, _, scene = aist
+    clip = extract_clip(scene, CaptureConfig())
+    assert clip.fps == 12
+    assert clip.frame_indices[~clip.held_out].tolist() == [0, 5, 10, 15]
+    for frame, mask in zip(clip.frames, clip.masks, strict=True):
+        np.testing.assert_array_equal(frame[~mask], clip.background[~mask])
+
+
+@pytest.mark.parametrize(("which", "working"), [("zju", [0, 2, 4]), ("aist", [0, 5, 10])])
+def test_other_cameras_evaluate_the_frames_that_are_learned_from(which, working, request):
+    _, _, scene = request.getfixturevalue(which)
+    clip = extract_clip(scene, CaptureConfig())
+    views = extract_evaluation(scene, clip.frame_indices, CaptureConfig())
+    assert len(views) == 2
+    for view in views:
+        assert view.frame_indices[:3].tolist() == working
+
+
+@pytest.mark.parametrize("which", ["zju", "aist"])
+def test_what_was_assumed_is_kept_beside_the_scene(which, request):
+    _, source, scene = request.getfixturevalue(which)
+    record = json.loads((scene.root / "import.json").read_text())
+    assert record["source"] == str(source)
+    assert any(remark.startswith("up is") for remark in record["remarks"])
+    assert scene.description.license
+    assert scene.description.attribution
