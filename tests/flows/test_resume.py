@@ -28,7 +28,7 @@ def started(scene, store, out):
 
 
 def kill_after_the_first_checkpoint(process, store):
-    for _ in range(6000):
+    for _ in range(30_000):
         if list(store.glob("optimise_scene/*.partial/checkpoint.safetensors")):
             break
         assert process.poll() is None
