@@ -1,0 +1,235 @@
+"""A body fitted to what one camera saw of a person: landmarks first, then outlines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from mocoflow_core.body.fit.first_guess import first_guess
+from mocoflow_core.body.fit.fittable_body import LANDMARKS, READINGS, FittableBody
+from mocoflow_core.body.fit.landmark_misfit import LandmarkConfig, PictureMisfit, SpaceMisfit
+from mocoflow_core.body.fit.least_squares import Term, minimise
+from mocoflow_core.body.fit.mask_misfit import MaskConfig, MaskOutlines
+from mocoflow_core.body.fit.posed_body import BodyPose, Mixtures, PosedBody
+from mocoflow_core.body.fit.prior import Fact, Prior, PriorConfig
+from mocoflow_core.body.fit.sightings import Sightings
+from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.body.silhouette import overlap, silhouette
+from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.errors import InputError
+from mocoflow_core.geometry.camera import Camera
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+_COCO = 17
+
+
+class BodyFitConfig(ConfigurationPart):
+    """What is known of the person, and how long to search."""
+
+    height_m: float | None = Field(
+        None, ge=1.3, le=2.3, description="The person's height, barefoot; moves the depth with it."
+    )
+    gender: float | None = Field(None, ge=0, le=1, description="0 male, 1 female; tells the size.")
+    landmarks: LandmarkConfig = LandmarkConfig()
+    masks: MaskConfig = MaskConfig()
+    prior: PriorConfig = PriorConfig()
+    rough_steps: int = Field(15, ge=1, description="First steps, which forgive large errors.")
+    steps: int = Field(15, ge=0, description="Steps onto the landmarks.")
+    looks: int = Field(5, ge=0, description="How often outlines are matched.")
+    steps_a_look: int = Field(2, ge=1, description="Steps after each match.")
+
+
+@dataclass(frozen=True, eq=False)
+class FittedBody:
+    """A located body for every frame, world metres, with how well it fits."""
+
+    meshes: MeshSequence
+    pose: BodyPose
+    readings: dict[str, float]  # what the shape means: stature in metres and Anny's phenotype
+    landmark_px: Array  # (T,) rms distance of the landmarks seen; NaN where none is
+    silhouette_iou: Array  # (T,) NaN without a mask
+    warnings: tuple[str, ...]
+
+
+def fit_body(
+    sightings: Sightings,
+    masks: NDArray[np.bool_] | None,
+    camera: Camera,
+    fps: float,
+    configuration: BodyFitConfig,
+    frame_indices: NDArray[np.int32] | None = None,
+    up_world: Array | None = None,
+    progress: Progress = lambda fraction, text: None,
+) -> FittedBody:
+    """The likeliest movement of one person, given landmarks and masks of an evenly timed clip.
+
+    The root is turned by landmarks in space or chosen among headings; then joints, place and one
+    shape for all frames are found by damped Gauss-Newton steps, on landmarks, then on outlines as
+    well. Depth and size are one unknown: without a height the usual one decides.
+
+    Args:
+        sightings: of T frames, ``fps`` apart; frames without anybody are bridged.
+        masks: (T, H, W), an empty one says nothing; None leaves the outlines out.
+        camera: a pinhole of the landmarks' pixels.
+        up_world: (3,) where it is known; people mostly stand upright.
+
+    Raises InputError for sizes that disagree.
+    """
+    _check(sightings, masks, camera)
+    body = FittableBody.load()
+    prior = _prior(body, camera, fps, configuration, up_world)
+    up = -np.array([0.0, 1.0, 0.0]) if prior.up is None else prior.up
+    shape = _usual_shape(body, prior.facts)
+    progress(0.0, "guessing where the person faces")
+    pose = first_guess(body, sightings, camera.K, up, shape)
+    rough, fine = _misfits(body, sightings, camera, pose, configuration)
+    progress(0.1, "fitting the landmarks")
+    pose = minimise([prior, *rough], pose, configuration.rough_steps)
+    pose = minimise([prior, *fine], pose, configuration.steps)
+    if masks is not None and masks.any():
+        pose = _onto_masks(body, masks, camera, [prior, *fine], pose, configuration, progress)
+    return _fitted(body, pose, sightings, masks, camera, frame_indices)
+
+
+def _onto_masks(
+    body: FittableBody,
+    masks: NDArray[np.bool_],
+    camera: Camera,
+    terms: list[Term],
+    pose: BodyPose,
+    configuration: BodyFitConfig,
+    progress: Progress,
+) -> BodyPose:
+    outlines = MaskOutlines.of(body, masks, camera, configuration.masks)
+    first, last = configuration.masks.outlier_m
+    for look in range(configuration.looks):
+        share = look / max(configuration.looks - 1, 1)
+        progress(0.4 + 0.5 * look / configuration.looks, "fitting the outlines")
+        misfit = outlines.look(pose, first ** (1 - share) * last**share)
+        pose = minimise([*terms, misfit], pose, configuration.steps_a_look)
+    return pose
+
+
+def _prior(
+    body: FittableBody,
+    camera: Camera,
+    fps: float,
+    configuration: BodyFitConfig,
+    up_world: Array | None,
+) -> Prior:
+    facts = []
+    if configuration.height_m is not None:
+        facts.append(Fact("stature_m", configuration.height_m, 0.005))
+    if configuration.gender is not None:
+        facts.append(Fact("gender", configuration.gender, 0.1))
+    up = None if up_world is None else camera.R @ up_world
+    return Prior(body, 1.0 / fps, configuration.prior, tuple(facts), up)
+
+
+def _usual_shape(body: FittableBody, facts: tuple[Fact, ...]) -> Array:
+    """The likeliest shape (C,) for what is known."""
+    if not facts:
+        return np.zeros(body.shape_count)
+    rows = np.stack([body.readings[READINGS.index(f.reading)] for f in facts])
+    spread = np.diag([f.spread**2 for f in facts])
+    off = np.array([f.value for f in facts]) - rows[:, -1]
+    rows = rows[:, :-1]
+    return rows.T @ np.linalg.solve(rows @ rows.T + spread, off)
+
+
+def _misfits(
+    body: FittableBody,
+    sightings: Sightings,
+    camera: Camera,
+    pose: BodyPose,
+    configuration: BodyFitConfig,
+) -> tuple[list[Term], list[Term]]:
+    """The landmarks' terms while far from them, and close to them."""
+    landmarks = configuration.landmarks
+    scale = pose.places[:, 2] / np.sqrt(camera.K[0, 0] * camera.K[1, 1])
+    fine = PictureMisfit(
+        body,
+        body.regressor,
+        sightings,
+        camera.K,
+        scale,
+        landmarks.picture_error_m,
+        landmarks.outlier,
+    )
+    rough = replace(fine, error_m=4 * landmarks.picture_error_m)
+    if sightings.world is None:
+        return [rough], [fine]
+    space = SpaceMisfit(
+        body, body.regressor, sightings, landmarks.space_error_m, landmarks.outlier
+    )
+    return [rough, space], [fine, space]
+
+
+def _fitted(
+    body: FittableBody,
+    pose: BodyPose,
+    sightings: Sightings,
+    masks: NDArray[np.bool_] | None,
+    camera: Camera,
+    frame_indices: NDArray[np.int32] | None,
+) -> FittedBody:
+    posed = PosedBody.of(body, pose)
+    world = camera.to_world(posed.vertices())
+    frames = len(world)
+    indices = np.arange(frames, dtype=np.int32) if frame_indices is None else frame_indices
+    meshes = MeshSequence(
+        indices, world.astype(np.float32), body.faces, body.regressor[:_COCO].astype(np.float32)
+    )
+    readings = {name: round(body.reading(name, pose.shape), 3) for name in READINGS}
+    landmark_px = _landmark_px(posed, sightings, camera)
+    iou = np.full(frames, np.nan)
+    if masks is not None:
+        shown = masks.any(axis=(1, 2))
+        for row in np.flatnonzero(shown):
+            iou[row] = overlap(silhouette(world[row], body.faces, camera), masks[row])
+    return FittedBody(
+        meshes, pose, readings, landmark_px, iou, _warnings(sightings, landmark_px, iou, readings)
+    )
+
+
+def _landmark_px(posed: PosedBody, sightings: Sightings, camera: Camera) -> Array:
+    places = posed.points(Mixtures.of(posed.body, posed.body.regressor, posed.pose.shape))
+    projected = places @ camera.K.T
+    pixels = projected[..., :2] / np.maximum(projected[..., 2:], 0.1)
+    squared = ((pixels - sightings.places) ** 2).sum(-1)
+    total = sightings.confidence.sum(1)
+    mean = (sightings.confidence * squared).sum(1) / np.maximum(total, 1e-9)
+    return np.where(total > 0, np.sqrt(mean), np.nan)
+
+
+def _warnings(
+    sightings: Sightings, landmark_px: Array, iou: Array, readings: dict[str, float]
+) -> tuple[str, ...]:
+    warnings = []
+    unseen = int((~sightings.seen).sum())
+    if unseen:
+        warnings.append(f"{unseen} of {len(iou)} frames show nobody and are bridged")
+    if np.isfinite(iou).any() and np.nanmedian(iou) < 0.7:
+        warnings.append(f"the fitted body overlaps the masks by {np.nanmedian(iou):.2f} only")
+    return tuple(warnings)
+
+
+def _check(sightings: Sightings, masks: NDArray[np.bool_] | None, camera: Camera) -> None:
+    frames = len(sightings.places)
+    if masks is not None and masks.shape != (frames, camera.height, camera.width):
+        raise InputError(
+            f"masks ({frames}, {camera.height}, {camera.width}) like landmarks and camera",
+            str(masks.shape),
+            "Give one mask of the camera's size for each frame.",
+        )
+    if not camera.is_pinhole:
+        raise InputError(
+            "a pinhole camera", "one with distortion", "Undistort pictures and landmarks first."
+        )
+    assert len(LANDMARKS) == sightings.places.shape[1]
