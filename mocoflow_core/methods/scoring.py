@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.methods.person_scores import network_rows
 from mocoflow_core.methods.rendered_views import (
     Pictures,
     Progress,
@@ -18,6 +20,7 @@ from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, few
 from mocoflow_core.methods.surface_errors import surface_rows
 from mocoflow_core.methods.truth_errors import TruthConfig, motion_rows
 from mocoflow_core.metrics.curve import CurveRow, write_curve
+from mocoflow_core.metrics.person_judge import PersonScoreConfig
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.metrics.table import mean_scores, write_scores
 from mocoflow_core.rendering.trained_scene import TrainedScene
@@ -26,6 +29,21 @@ from mocoflow_core.training.snapshots import read_snapshots, snapshot_weights
 
 METHODS = ("mocoflow", "posed_mesh")
 MeanScores = dict[str, dict[str, dict[str, float]]]  # method, camera, metric
+
+
+class Judging(NamedTuple):
+    """How the scores are measured."""
+
+    evaluating: EvaluationConfig
+    person: PersonScoreConfig
+    truth: TruthConfig
+
+
+class Scored(NamedTuple):
+    """Means over frames, and which scores are missing for a reason that a user can act on."""
+
+    means: MeanScores
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -43,23 +61,26 @@ def score_run(
     subject: Subject,
     folders: ScoringFolders,
     before: Seconds,
-    evaluating: EvaluationConfig,
-    truth: TruthConfig,
+    judging: Judging,
     into: Path,
     progress: Progress,
-) -> MeanScores:
+) -> Scored:
     """Write ``scores.parquet`` and ``error_curve.parquet``; give the means over frames.
 
     ``before`` is the training clock at the start of the optimisation.
     """
+    evaluating, truth = judging.evaluating, judging.truth
     clip = Clip.load(folders.clip)
     views = scored_views(clip, load_clips(folders.evaluation), evaluating)
     renderer = TrainedRenderer(TrainedScene.open(folders.trained), clip)
+    rendered = {method: Pictures(folders.views / method) for method in METHODS}
     rows = [
         row
-        for method in METHODS
-        for row in score_views(subject, method, views, Pictures(folders.views / method), evaluating)
+        for method, pictures in rendered.items()
+        for row in score_views(subject, method, views, pictures, evaluating)
     ]
+    judged, missing = network_rows(subject, rendered, views, evaluating, judging.person)
+    rows += judged
     meshes = MeshSequence.load(folders.bodies / "meshes.npz")
     canonical = renderer.scene.space.canonical_vertices
     truth_file = folders.evaluation / "truth.npz"
@@ -74,7 +95,8 @@ def score_run(
     curve = error_curve(subject, moments, views, evaluating, progress)
     curve += train_rows(subject, folders.trained, before)
     write_curve(curve, into / "error_curve.parquet")
-    return mean_scores(rows)
+    absent = (f"no plausibility, OKS and LPIPS: {missing}",) if missing else ()
+    return Scored(mean_scores(rows), absent)
 
 
 def _kept_moments(

@@ -131,16 +131,14 @@ class PersonJudge:
         )
 
 
-def open_networks(
-    configuration: PersonScoreConfig,
-) -> tuple[PersonJudge, LpipsAlex] | str:
-    """The networks, or the reason why they are not there.
+def open_networks(configuration: PersonScoreConfig) -> tuple[PersonJudge, LpipsAlex] | str:
+    """The networks, or the reason why they are not there; no reason where nobody wants them.
 
     Raises:
         InputError: weights are missing and the configuration asks for them.
     """
     if configuration.use == "off":
-        return "switched off"
+        return ""
     try:
         return PersonJudge(configuration), LpipsAlex()
     except InputError as error:
