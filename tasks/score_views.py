@@ -52,6 +52,6 @@ def score_views(
     )
     subject = Subject(scene, seed)
     before = Seconds(trained.summary["before_wall_s"], trained.summary["before_cpu_s"])
-    judging = Judging(evaluating, person, truth)
+    judging = Judging(evaluating, person, truth, tuple(clip.summary["up"]))
     scored = score_run(subject, folders, before, judging, work.folder, work.progress)
     return {"mean": scored.means, "warnings": list(scored.warnings)}

@@ -13,7 +13,7 @@ from mocoflow_core.methods.rendered_views import Renderer, ScoredView
 from mocoflow_core.methods.scored_views import Subject, side_of
 from mocoflow_core.metrics.crop import Crop, crop_around
 from mocoflow_core.metrics.perceptual import LpipsAlex, lpips_protocol
-from mocoflow_core.metrics.person_judge import PersonJudge, PersonScoreConfig, Sight, open_networks
+from mocoflow_core.metrics.person_judge import Networks, PersonJudge, PersonScoreConfig, Sight
 from mocoflow_core.metrics.score import WHITE, EvaluationConfig, on_white
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.views import draw_views
@@ -43,23 +43,17 @@ def network_rows(
     views: Sequence[ScoredView],
     evaluating: EvaluationConfig,
     configuration: PersonScoreConfig,
-) -> tuple[list[ScoreRow], str]:
-    """Rows of ``lpips_alex``, ``plausibility`` and ``oks``; or none, and why.
-
-    Raises:
-        InputError: weights are missing and the configuration asks for them.
-    """
-    networks = open_networks(configuration)
-    if isinstance(networks, str):
-        return [], networks
+    networks: Networks,
+) -> list[ScoreRow]:
+    """Rows of ``lpips_alex``, ``plausibility`` and ``oks``."""
     judge, lpips = networks
     if not views:
-        return [], ""
+        return []
     side = side_of(views, evaluating)
     cuts = [cut_of(view, side) for view in views]
     rows = lpips_rows(subject, renderers, cuts, lpips, side)
     drawn = _drawn(cuts, configuration.views, evaluating.seed)
-    return rows + person_rows(subject, renderers, drawn, judge, len(views)), ""
+    return rows + person_rows(subject, renderers, drawn, judge, len(views))
 
 
 def cut_of(view: ScoredView, side: int) -> Cut:

@@ -8,10 +8,14 @@ from typing import NamedTuple
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.methods.orbit_scores import Square, orbit_rows, rings_around
 from mocoflow_core.methods.person_scores import network_rows
+from mocoflow_core.methods.posed_mesh import colour_mesh
 from mocoflow_core.methods.rendered_views import (
     Pictures,
+    PosedMeshRenderer,
     Progress,
+    Renderer,
     TrainedRenderer,
     load_clips,
     scored_views,
@@ -19,10 +23,11 @@ from mocoflow_core.methods.rendered_views import (
 from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, few_views, score_views
 from mocoflow_core.methods.surface_errors import surface_rows
 from mocoflow_core.methods.truth_errors import TruthConfig, motion_rows
+from mocoflow_core.metrics.crop import crop_side
 from mocoflow_core.metrics.curve import CurveRow, write_curve
-from mocoflow_core.metrics.person_judge import PersonScoreConfig
+from mocoflow_core.metrics.person_judge import PersonJudge, PersonScoreConfig, open_networks
 from mocoflow_core.metrics.score import EvaluationConfig
-from mocoflow_core.metrics.table import mean_scores, write_scores
+from mocoflow_core.metrics.table import ScoreRow, mean_scores, write_scores
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.training.clock import Seconds
 from mocoflow_core.training.snapshots import read_snapshots, snapshot_weights
@@ -37,6 +42,7 @@ class Judging(NamedTuple):
     evaluating: EvaluationConfig
     person: PersonScoreConfig
     truth: TruthConfig
+    up: tuple[float, ...]  # of the world
 
 
 class Scored(NamedTuple):
@@ -71,7 +77,8 @@ def score_run(
     """
     evaluating, truth = judging.evaluating, judging.truth
     clip = Clip.load(folders.clip)
-    views = scored_views(clip, load_clips(folders.evaluation), evaluating)
+    others = load_clips(folders.evaluation)
+    views = scored_views(clip, others, evaluating)
     renderer = TrainedRenderer(TrainedScene.open(folders.trained), clip)
     rendered = {method: Pictures(folders.views / method) for method in METHODS}
     rows = [
@@ -79,9 +86,13 @@ def score_run(
         for method, pictures in rendered.items()
         for row in score_views(subject, method, views, pictures, evaluating)
     ]
-    judged, missing = network_rows(subject, rendered, views, evaluating, judging.person)
-    rows += judged
     meshes = MeshSequence.load(folders.bodies / "meshes.npz")
+    networks = open_networks(judging.person)
+    missing = networks if isinstance(networks, str) else ""
+    if not isinstance(networks, str):
+        rows += network_rows(subject, rendered, views, evaluating, judging.person, networks)
+        if not others:
+            rows += _around(subject, renderer, clip, meshes, judging, networks.judge)
     canonical = renderer.scene.space.canonical_vertices
     truth_file = folders.evaluation / "truth.npz"
     known = truth_file if truth_file.exists() else None
@@ -97,6 +108,25 @@ def score_run(
     write_curve(curve, into / "error_curve.parquet")
     absent = (f"no plausibility, OKS and LPIPS: {missing}",) if missing else ()
     return Scored(mean_scores(rows), absent)
+
+
+def _around(
+    subject: Subject,
+    trained: TrainedRenderer,
+    clip: Clip,
+    meshes: MeshSequence,
+    judging: Judging,
+    judge: PersonJudge,
+) -> list[ScoreRow]:
+    """Scores of views from all around, for a scene that no other camera saw."""
+    evaluating = judging.evaluating
+    masks = clip.masks[clip.has_mask]
+    side = crop_side(masks, evaluating.crop_share, evaluating.crop_box_margin)
+    rings = rings_around(clip.camera, clip.frame_indices, meshes, judging.up, judging.person)
+    posed = PosedMeshRenderer(colour_mesh(clip, meshes), meshes)
+    renderers: dict[str, Renderer] = {"mocoflow": trained, "posed_mesh": posed}
+    square = Square(side, evaluating.opacity_threshold)
+    return orbit_rows(subject, renderers, rings, square, judging.person, judge)
 
 
 def _kept_moments(

@@ -120,18 +120,30 @@ class PersonJudge:
             f"{chosen.confidence:g}, box from {chosen.least_area:g} of the picture"
         )
 
+    def keypoints_name(self) -> str:
+        """Which keypoints, and where they are looked for."""
+        return (
+            f"keypoints: {self._keypoints.name} {self._keypoints.digest[:12]} in the person's box"
+        )
+
     def oks_protocol(self) -> str:
         """Which keypoints are compared, and how."""
-        chosen, keypoints = self._configuration, self._keypoints
         return (
-            f"keypoints: {keypoints.name} {keypoints.digest[:12]} in the person's box "
-            f"of either picture; points from {chosen.keypoint_confidence:g} in the photograph, "
+            f"{self.keypoints_name()} of either picture; points from "
+            f"{self._configuration.keypoint_confidence:g} in the photograph, "
             "each pose about their mean, COCO sigmas, area of the truth mask; 0 without a person "
             "in the render"
         )
 
 
-def open_networks(configuration: PersonScoreConfig) -> tuple[PersonJudge, LpipsAlex] | str:
+class Networks(NamedTuple):
+    """What looks at the pictures."""
+
+    judge: PersonJudge
+    lpips: LpipsAlex
+
+
+def open_networks(configuration: PersonScoreConfig) -> Networks | str:
     """The networks, or the reason why they are not there; no reason where nobody wants them.
 
     Raises:
@@ -140,7 +152,7 @@ def open_networks(configuration: PersonScoreConfig) -> tuple[PersonJudge, LpipsA
     if configuration.use == "off":
         return ""
     try:
-        return PersonJudge(configuration), LpipsAlex()
+        return Networks(PersonJudge(configuration), LpipsAlex())
     except InputError as error:
         if configuration.use == "on":
             raise

@@ -151,7 +151,7 @@ def _camera_rows(title: str, rows: list[ScoreRow], metrics: list[str]) -> list[C
     rivals = [method for method in methods if method != PHOTOGRAPH]
     table = []
     for method in methods:
-        views = len({(r.camera, r.frame_index, r.seed) for r in rows if r.method == method})
+        views = max(len(values[method, metric]) for metric in metrics)
         cells = [
             Cell(
                 label_of(metric).text(means[method, metric]),
