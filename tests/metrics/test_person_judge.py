@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from mocoflow_core.metrics.person_judge import PersonJudge, PersonScoreConfig, open_networks
+from mocoflow_core.perception.nanodet import NanoDet
+from mocoflow_core.perception.person import Boxes, Keypoints
+
+CONFIGURATION = PersonScoreConfig()
+
+
+class DarkPerson:
+    """Detects the dark pixels as the person: a detector that is exact and cheap."""
+
+    name = "dark pixels"
+    digest = "0" * 64
+
+    def boxes(self, images: Sequence[np.ndarray]) -> list[Boxes]:
+        found = []
+        for image in images:
+            y, x = np.nonzero(image.mean(axis=2) < 128)
+            corners = [[x.min(), y.min(), x.max() + 1, y.max() + 1]] if len(x) else []
+            confidence = np.ones(len(corners), np.float32)
+            found.append(Boxes(np.array(corners, np.float32).reshape(-1, 4), confidence))
+        return found
+
+    def keypoints(self, images, boxes) -> list[Keypoints | None]:
+        steps = np.linspace(0, 1, 17)[:, None]
+        return [
+            Keypoints((box[:2] + steps * (box[2:] - box[:2])).astype(np.float32), np.ones(17))
+            for box in boxes
+        ]
+
+
+@pytest.fixture
+def judge() -> PersonJudge:
+    return PersonJudge(CONFIGURATION, DarkPerson(), DarkPerson())
+
+
+def block(left: int, width: int = 20) -> np.ndarray:
+    image = np.full((60, 60, 3), 255, np.uint8)
+    image[10:50, left : left + width] = 0
+    return image
+
+
+WHITE = np.full((60, 60, 3), 255, np.uint8)
+
+
+def test_a_moved_person_is_like_the_photograph_and_a_missing_one_scores_zero(judge):
+    reference, moved, missing = judge.look([block(10), block(25), WHITE])
+    assert judge.similarity(moved, reference, 800.0) == pytest.approx(1.0, abs=1e-6)
+    assert judge.similarity(missing, reference, 800.0) == 0.0
+    assert (moved.person, missing.person) == (True, False)
+
+
+def test_a_photograph_without_a_person_is_no_reference(judge):
+    missing, found = judge.look([WHITE, block(10)])
+    assert not judge.has_reference(missing)
+    assert judge.has_reference(found)
+    assert np.isnan(judge.similarity(found, missing, 800.0))
+
+
+def test_a_mirrored_look_comes_back_to_the_same_place(judge):
+    (sight,) = judge.look_mirrored([block(5, width=25)])
+    box = sight.pose.places.min(axis=0), sight.pose.places.max(axis=0)
+    assert np.allclose(box, [[5, 10], [30, 50]])
+
+
+def test_every_number_says_which_networks_gave_it(judge):
+    assert "dark pixels 000000000000" in judge.plausibility_protocol()
+    assert "0.5" in judge.plausibility_protocol()
+    assert "dark pixels 000000000000" in judge.oks_protocol()
+
+
+def test_a_network_sees_no_person_in_white_or_noise():
+    noise = np.random.default_rng(0).integers(0, 256, (120, 120, 3), dtype=np.uint8)
+    white, noisy = NanoDet().boxes([WHITE, noise])
+    assert max([*white.confidence, *noisy.confidence], default=0.0) < CONFIGURATION.confidence
+
+
+def test_networks_switched_off_are_not_loaded_and_need_no_reason():
+    assert open_networks(PersonScoreConfig(use="off")) == ""
