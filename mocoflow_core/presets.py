@@ -27,12 +27,14 @@ from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training.mesh_views import MeshViewsConfig
 from mocoflow_core.training.pretrain_density import DensityConfig
 from mocoflow_core.training.schedule import ScheduleConfig
+from mocoflow_core.video.configuration import VideoConfig
 
 
 class Configuration(ConfigurationPart):
     """Everything that can be set, by stage."""
 
     representation: Representation = "hybrid"
+    video: VideoConfig = VideoConfig()
     capture: CaptureConfig = CaptureConfig()
     meshes: EstimateConfig = EstimateConfig()
     location: LocationConfig = LocationConfig()

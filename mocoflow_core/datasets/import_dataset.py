@@ -64,7 +64,7 @@ def import_dataset(
     Raises InputError as the reader and the checks do, for a folder with content, and a full disk.
     """
     require_new(out)
-    scene = kind.read(source, configuration)
+    scene = kind.open(source, configuration, progress)
     findings = check_dataset(scene)
     imported = ImportedDataset(
         scene.name, scene.train_camera, scene.remarks, findings.measured, findings.warnings

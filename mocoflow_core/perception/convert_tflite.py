@@ -143,7 +143,7 @@ class Converter:
     def _add(self, op: str, takes: list[int], result: int, **settings: Any) -> str:  # noqa: ANN401
         name = f"{op}{len(self.nodes)}"
         given = tuple(self._names[tensor] for tensor in takes)
-        self.nodes.append(Node(name=name, op=op, takes=given, **settings))  # type: ignore[arg-type]
+        self.nodes.append(Node(name=name, op=op, takes=given, **settings))
         self._names[result] = name
         return name
 

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from mocoflow_core.body.fit.fit_body import BodyFitConfig
 from mocoflow_core.configuration import ConfigurationPart
 
 
@@ -24,10 +25,11 @@ class VideoConfig(ConfigurationPart):
     person: int | None = Field(
         None, ge=0, description="Which of the persons, from 0 by size; null: the only large one."
     )
-    bodies: Literal["none"] = Field(
-        "none", description="None: meshes are given with --meshes later."
+    bodies: Literal["fitted", "none"] = Field(
+        "fitted", description="None: meshes are given with --meshes later."
     )
+    body: BodyFitConfig = BodyFitConfig()
     least_difference: int = Field(
         30, ge=1, le=255, description="Difference to the plate that is no noise, 1/255."
     )
-    plate_frames: int = Field(48, ge=2, description="At most so many frames make the plate.")
+    plate_frames: int = Field(24, ge=2, description="At most so many frames make the plate.")

@@ -70,7 +70,8 @@ def regions_between(track: Track, count: int) -> list[Region]:
     known = np.array([(*circle.centre, circle.side, circle.angle) for circle in circles])
     known[:, 3] = np.unwrap(known[:, 3])
     columns = [np.interp(np.arange(count), rows, column) for column in known.T]
-    return [Region((float(x), float(y)), float(s), float(a)) for x, y, s, a in zip(*columns)]
+    rows_of_four = np.column_stack(columns).tolist()
+    return [Region((x, y), side, angle) for x, y, side, angle in rows_of_four]
 
 
 def longest_stay(present: NDArray[np.bool_], longest_gap: int) -> tuple[int, int]:

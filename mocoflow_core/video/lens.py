@@ -27,7 +27,7 @@ def camera_of_video(
     focal_px: float | None,
     metadata: Mapping[str, str],
 ) -> tuple[Camera, str]:
-    """A pinhole that is the world itself, for frames of ``size``; and where its focal length is from.
+    """A pinhole that is the world itself, for frames of ``size``; where its focal length is from.
 
     Args:
         video_size: width and height of the video's pictures, to whose pixels ``focal_px`` refers.

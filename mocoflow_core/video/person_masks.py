@@ -130,7 +130,7 @@ def _without_pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _without_holes(mask: NDArray[np.uint8]) -> Mask:
     """Small holes are filled; those between arm and body stay."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
     filled = stats[:, cv2.CC_STAT_AREA] < SMALLEST_HOLE * max(int(mask.sum()), 1)
     filled[0] = False
     return (mask > 0) | filled[labels]

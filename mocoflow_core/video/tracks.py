@@ -91,7 +91,9 @@ def choose_track(tracks: Sequence[Track], frames: int, person: int | None) -> tu
     ]
     if rivals:
         raise InputError(
-            "one person who is the largest", f"{1 + len(rivals)} of a size", f"Choose one: {listed}."
+            "one person who is the largest",
+            f"{1 + len(rivals)} of a size",
+            f"Choose one: {listed}.",
         )
     if len(tracks) == 1:
         return first, f"one person: {first.describe(frames)}"
