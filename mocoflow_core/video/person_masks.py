@@ -25,6 +25,8 @@ LONGEST_STEP_S = 0.05
 # Pieces below this share of the largest are no part of the person; holes below it are filled.
 SMALLEST_PIECE = 0.03
 SMALLEST_HOLE = 0.002
+# Edges are smoothed over 3 pixels, or 5 in pictures whose longer side is at least this.
+LARGE_PICTURE = 640
 # Masks are grown by this share of the longer side before the plate is made.
 PLATE_MARGIN = 0.015
 
@@ -94,15 +96,12 @@ def refine(
     probability: Probability, picture: Image, plate: NDArray[np.uint8], least_difference: int
 ) -> Mask:
     """The person (H, W): what is sure, and what is unsure and differs from the plate."""
-    difference = cv2.blur(cv2.absdiff(picture, plate).max(axis=-1), (3, 3))
+    difference = cv2.medianBlur(cv2.absdiff(picture, plate).max(axis=-1), 3)
     doubtful = (probability > SURELY_NOT) & (difference > least_difference)
     mask = ((probability > SURELY) | doubtful).astype(np.uint8)
     side = 3 if max(mask.shape) < LARGE_PICTURE else 5
     mask = cv2.medianBlur(mask, side)
     return _without_holes(_without_pieces(mask))
-
-
-LARGE_PICTURE = 640
 
 
 def _steady(poses: list[Pose], row: int, shape: tuple[int, ...], rate: float) -> Probability:
