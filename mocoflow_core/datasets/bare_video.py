@@ -84,8 +84,13 @@ def read_bare_video(
             *(rate_said, *person.remarks, *_cut_off(person, frames)),
             *(motion_said, lens_said, *fit_said),
         ),
-        working_fps=min(configuration.working_fps, frames.rate),
+        working_fps=_working_fps(frames.rate, configuration.working_fps),
     )
+
+
+def _working_fps(rate: float, wanted: float) -> float:
+    """Near the wanted one, and a whole part of the rate: frames between can then be held out."""
+    return rate / max(1, int(rate / wanted + 0.5))
 
 
 def _fit(

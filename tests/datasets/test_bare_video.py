@@ -49,7 +49,7 @@ def test_a_video_becomes_a_scene_with_masks_plate_and_camera(scene):
     assert camera.background.shape == (320, 180, 3)
     for _, mask in camera.masks.read([0, 9]):
         assert 0.08 < mask.mean() < 0.25
-        assert mask[60:240, 40:70].mean() > 0.5
+        assert mask[90:230, 62:88].mean() > 0.7
 
 
 def test_what_was_assumed_is_said(scene):

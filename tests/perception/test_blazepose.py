@@ -76,7 +76,7 @@ def test_the_mask_holds_the_body_and_not_the_room(poses):
         columns, rows = pose.keypoints.places[5:].astype(int).T
         assert mask[rows, columns].mean() > 0.8
         assert 0.05 < mask.mean() < 0.3
-        assert not mask[:, -60:].any()
+        assert not mask[:, -50:].any()
 
 
 def test_the_person_is_found_again_where_the_pose_says(model, poses):

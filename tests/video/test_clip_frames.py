@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -86,3 +87,24 @@ def test_frames_come_smaller_and_repeatedly_where_the_video_stood_still(tmp_path
     assert len(set(frames.numbers.tolist())) < len(frames.numbers)
     later = frames.part(5, 9)
     assert later.indices.tolist() == frames.indices[5:10].tolist()
+
+
+def test_a_portrait_video_stands_upright(tmp_path):
+    pictures = [np.zeros((64, 96, 3), np.uint8) for _ in range(10)]
+    for picture in pictures:
+        picture[:16, :16] = 255  # Top left as stored, top right as shown.
+    path = tmp_path / "portrait.mp4"
+    write_video(path, pictures, 10)
+    path.write_bytes(_turned_clockwise(path.read_bytes()))
+    frames, _ = choose_frames(path, read_video_facts(path), VideoConfig())
+    assert frames.video_size == frames.size == (64, 96)
+    ((_, shown),) = frames.read([3])
+    assert shown[:16, -16:].mean() > 200
+    assert shown[:16, :16].mean() < 50
+
+
+def _turned_clockwise(film: bytes) -> bytes:
+    """The file with the track's matrix that phones write when they are held upright."""
+    matrix = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, 0, 0, 1 << 30)
+    start = film.index(b"tkhd") + 44  # Behind flags, times, number, duration, layer, volume.
+    return film[:start] + matrix + film[start + len(matrix) :]

@@ -25,7 +25,10 @@ def walking(start, end, side, frames=FRAMES):
 
 def beside(*persons):
     """Detections of every frame, in an order that says nothing."""
-    return [list(found if row % 2 else found[::-1]) for row, found in enumerate(zip(*persons))]
+    return [
+        list(found if row % 2 else found[::-1])
+        for row, found in enumerate(zip(*persons, strict=True))
+    ]
 
 
 def test_persons_are_told_apart_by_overlap_over_time():
