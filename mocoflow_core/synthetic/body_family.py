@@ -70,9 +70,7 @@ def _adult(random: np.random.Generator) -> BodyShape:
     )
 
 
-def _rest_bodies(
-    anny: Anny, coefficients: torch.Tensor, topology: Topology
-) -> tuple[Array, Array]:
+def _rest_bodies(anny: Anny, coefficients: torch.Tensor, topology: Topology) -> tuple[Array, Array]:
     """Vertices (S, V, 3) and joints (S, J, 3) in the reference pose."""
     bones = [anny.bone_labels.index(joint) for joint in JOINTS]
     vertices, heads = [], []
@@ -86,7 +84,7 @@ def _rest_bodies(
 
 def _part_weights(anny: Anny, topology: Topology) -> Array:
     """(V, J): what each of ``JOINTS`` moves, with all bones below it that do not turn."""
-    part = []
+    part: list[int] = []
     for bone, parent in zip(anny.bone_labels, anny.bone_parents, strict=True):
         part.append(JOINTS.index(bone) if bone in JOINTS else part[parent])
     dense = topology.mixture @ anny.dense_vertex_bone_weights.numpy()

@@ -16,8 +16,10 @@ Array = NDArray[np.float64]
 
 # Head, shoulders and hips move with the body; limbs do as they like.
 _TRUNK = np.array(
-    [1.0 if name.split("_")[-1] in ("nose", "eye", "ear", "shoulder", "hip") else 0.05
-     for name in LANDMARKS]
+    [
+        1.0 if name.split("_")[-1] in ("nose", "eye", "ear", "shoulder", "hip") else 0.05
+        for name in LANDMARKS
+    ]
 )
 _HEADINGS = 36
 # Turning from frame to frame that is worth one usual error of the landmarks.
@@ -25,21 +27,27 @@ _TURN = np.radians(30.0)
 _USUAL_ERROR_M = 0.05
 
 
-def first_guess(body: FittableBody, sightings: Sightings, K: Array, up: Array, shape: Array) -> BodyPose:
+def first_guess(
+    body: FittableBody, sightings: Sightings, K: Array, up: Array, shape: Array
+) -> BodyPose:
     """The usual pose, turned and placed as the landmarks say; frames without any lie between.
 
     With landmarks in space the rotation is Kabsch's; without, the person stands along ``up``
     and the headings of all frames are chosen together.
     """
     frames = len(sightings.places)
-    standing = _standing(body, shape)
+    standing = _standing(body, sightings.points(body), shape)
     if sightings.world is not None:
         rotations = _turned_in_space(standing, sightings)
     else:
         rotations = _headings(standing, sightings, K, up)
     rotations = _between_seen(rotations, sightings.seen)
-    places = np.stack([_place(standing @ r.T, s, c, K) for r, s, c in zip(
-        rotations, sightings.places, sightings.confidence, strict=True)])
+    places = np.stack(
+        [
+            _place(standing @ r.T, s, c, K)
+            for r, s, c in zip(rotations, sightings.places, sightings.confidence, strict=True)
+        ]
+    )
     return BodyPose(
         _places_between(places, sightings.seen),
         rotations,
@@ -49,12 +57,12 @@ def first_guess(body: FittableBody, sightings: Sightings, K: Array, up: Array, s
     )
 
 
-def _standing(body: FittableBody, shape: Array) -> Array:
+def _standing(body: FittableBody, points: Mixtures, shape: Array) -> Array:
     """Landmarks (21, 3) in the usual pose at the origin."""
     pose = BodyPose(
         np.zeros((1, 3)), np.eye(3)[None], FREEDOM.usual[None], shape, np.zeros(len(body.parents))
     )
-    return PosedBody.of(body, pose).points(Mixtures.of(body, body.regressor, shape))[0]
+    return PosedBody.of(body, pose).points(points.shaped(shape))[0]
 
 
 def _turned_in_space(standing: Array, sightings: Sightings) -> Array:
@@ -72,10 +80,12 @@ def _headings(standing: Array, sightings: Sightings, K: Array, up: Array) -> Arr
     angles = 2 * np.pi * np.arange(_HEADINGS) / _HEADINGS
     upright = _upright(up)
     turns = upright @ Rotation.from_rotvec(angles[:, None] * [0, 0, 1]).as_matrix()
-    cost = np.stack([
-        [_unlike(standing @ turn.T, s, c, K) for turn in turns]
-        for s, c in zip(sightings.places, sightings.confidence, strict=True)
-    ])
+    cost = np.stack(
+        [
+            [_unlike(standing @ turn.T, s, c, K) for turn in turns]
+            for s, c in zip(sightings.places, sightings.confidence, strict=True)
+        ]
+    )
     apart = (angles[:, None] - angles + np.pi) % (2 * np.pi) - np.pi
     turning = 0.5 * (apart / _TURN) ** 2
     return turns[_cheapest_path(cost, turning)]

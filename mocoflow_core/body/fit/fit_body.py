@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from mocoflow_core.body.fit.first_guess import first_guess
-from mocoflow_core.body.fit.fittable_body import LANDMARKS, READINGS, FittableBody
-from mocoflow_core.body.fit.landmark_misfit import LandmarkConfig, PictureMisfit, SpaceMisfit
+from mocoflow_core.body.fit.fittable_body import READINGS, FittableBody
+from mocoflow_core.body.fit.landmark_misfit import LandmarkConfig, LandmarkMisfit, project
 from mocoflow_core.body.fit.least_squares import Term, minimise
 from mocoflow_core.body.fit.mask_misfit import MaskConfig, MaskOutlines
-from mocoflow_core.body.fit.posed_body import BodyPose, Mixtures, PosedBody
+from mocoflow_core.body.fit.posed_body import BodyPose, PosedBody
 from mocoflow_core.body.fit.prior import Fact, Prior, PriorConfig
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.body.silhouette import overlap, silhouette
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
@@ -27,6 +26,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 _COCO = 17
+# At first landmarks count as if they erred so many times as much.
+_ROUGHLY = 4.0
 
 
 class BodyFitConfig(ConfigurationPart):
@@ -88,25 +89,27 @@ def fit_body(
     shape = _usual_shape(body, prior.facts)
     progress(0.0, "guessing where the person faces")
     pose = first_guess(body, sightings, camera.K, up, shape)
-    rough, fine = _misfits(body, sightings, camera, pose, configuration)
+    close = _landmark_misfit(body, sightings, camera, pose, configuration)
+    far = replace(close, picture_error_m=_ROUGHLY * close.picture_error_m)
     progress(0.1, "fitting the landmarks")
-    pose = minimise([prior, *rough], pose, configuration.rough_steps)
-    pose = minimise([prior, *fine], pose, configuration.steps)
+    pose = minimise([prior, far], pose, configuration.rough_steps)
+    pose = minimise([prior, close], pose, configuration.steps)
+    overlaps = np.full(len(pose.places), np.nan)
+    sized = configuration.height_m is not None
     if masks is not None and masks.any():
-        pose = _onto_masks(body, masks, camera, [prior, *fine], pose, configuration, progress)
-    return _fitted(body, pose, sightings, masks, camera, frame_indices)
+        outlines = MaskOutlines.of(body, masks, camera, configuration.masks)
+        pose = _onto_masks(outlines, [prior, close], pose, configuration, progress)
+        overlaps = outlines.overlaps(pose)
+    return _fitted(body, pose, sightings, overlaps, camera, frame_indices, sized)
 
 
 def _onto_masks(
-    body: FittableBody,
-    masks: NDArray[np.bool_],
-    camera: Camera,
+    outlines: MaskOutlines,
     terms: list[Term],
     pose: BodyPose,
     configuration: BodyFitConfig,
     progress: Progress,
 ) -> BodyPose:
-    outlines = MaskOutlines.of(body, masks, camera, configuration.masks)
     first, last = configuration.masks.outlier_m
     for look in range(configuration.looks):
         share = look / max(configuration.looks - 1, 1)
@@ -132,7 +135,7 @@ def _prior(
     return Prior(body, 1.0 / fps, configuration.prior, tuple(facts), up)
 
 
-def _usual_shape(body: FittableBody, facts: tuple[Fact, ...]) -> Array:
+def _usual_shape(body: FittableBody, facts: Sequence[Fact]) -> Array:
     """The likeliest shape (C,) for what is known."""
     if not facts:
         return np.zeros(body.shape_count)
@@ -143,80 +146,70 @@ def _usual_shape(body: FittableBody, facts: tuple[Fact, ...]) -> Array:
     return rows.T @ np.linalg.solve(rows @ rows.T + spread, off)
 
 
-def _misfits(
+def _landmark_misfit(
     body: FittableBody,
     sightings: Sightings,
     camera: Camera,
     pose: BodyPose,
     configuration: BodyFitConfig,
-) -> tuple[list[Term], list[Term]]:
-    """The landmarks' terms while far from them, and close to them."""
-    landmarks = configuration.landmarks
-    scale = pose.places[:, 2] / np.sqrt(camera.K[0, 0] * camera.K[1, 1])
-    fine = PictureMisfit(
+) -> LandmarkMisfit:
+    focal = np.sqrt(camera.K[0, 0] * camera.K[1, 1])
+    return LandmarkMisfit(
         body,
-        body.regressor,
+        sightings.points(body),
         sightings,
         camera.K,
-        scale,
-        landmarks.picture_error_m,
-        landmarks.outlier,
+        pose.places[:, 2] / focal,
+        configuration.landmarks,
+        configuration.landmarks.picture_error_m,
     )
-    rough = replace(fine, error_m=4 * landmarks.picture_error_m)
-    if sightings.world is None:
-        return [rough], [fine]
-    space = SpaceMisfit(
-        body, body.regressor, sightings, landmarks.space_error_m, landmarks.outlier
-    )
-    return [rough, space], [fine, space]
 
 
 def _fitted(
     body: FittableBody,
     pose: BodyPose,
     sightings: Sightings,
-    masks: NDArray[np.bool_] | None,
+    overlaps: Array,
     camera: Camera,
     frame_indices: NDArray[np.int32] | None,
+    sized: bool,
 ) -> FittedBody:
     posed = PosedBody.of(body, pose)
-    world = camera.to_world(posed.vertices())
-    frames = len(world)
-    indices = np.arange(frames, dtype=np.int32) if frame_indices is None else frame_indices
-    meshes = MeshSequence(
-        indices, world.astype(np.float32), body.faces, body.regressor[:_COCO].astype(np.float32)
-    )
-    readings = {name: round(body.reading(name, pose.shape), 3) for name in READINGS}
+    world = camera.to_world(posed.vertices()).astype(np.float32)
+    indices = np.arange(len(world), dtype=np.int32) if frame_indices is None else frame_indices
+    regressor = body.regressor[:_COCO].astype(np.float32)
     landmark_px = _landmark_px(posed, sightings, camera)
-    iou = np.full(frames, np.nan)
-    if masks is not None:
-        shown = masks.any(axis=(1, 2))
-        for row in np.flatnonzero(shown):
-            iou[row] = overlap(silhouette(world[row], body.faces, camera), masks[row])
     return FittedBody(
-        meshes, pose, readings, landmark_px, iou, _warnings(sightings, landmark_px, iou, readings)
+        MeshSequence(indices, world, body.faces, regressor),
+        pose,
+        {name: round(body.reading(name, pose.shape), 3) for name in READINGS},
+        landmark_px,
+        overlaps,
+        _warnings(sightings, overlaps, body.reading("stature_m", pose.shape), sized),
     )
 
 
 def _landmark_px(posed: PosedBody, sightings: Sightings, camera: Camera) -> Array:
-    places = posed.points(Mixtures.of(posed.body, posed.body.regressor, posed.pose.shape))
-    projected = places @ camera.K.T
-    pixels = projected[..., :2] / np.maximum(projected[..., 2:], 0.1)
+    places = posed.points(sightings.points(posed.body).shaped(posed.pose.shape))
+    pixels, _ = project(places, camera.K)
     squared = ((pixels - sightings.places) ** 2).sum(-1)
     total = sightings.confidence.sum(1)
     mean = (sightings.confidence * squared).sum(1) / np.maximum(total, 1e-9)
     return np.where(total > 0, np.sqrt(mean), np.nan)
 
 
-def _warnings(
-    sightings: Sightings, landmark_px: Array, iou: Array, readings: dict[str, float]
-) -> tuple[str, ...]:
+def _warnings(sightings: Sightings, iou: Array, stature_m: float, sized: bool) -> tuple[str, ...]:
     warnings = []
     unseen = int((~sightings.seen).sum())
     if unseen:
         warnings.append(f"{unseen} of {len(iou)} frames show nobody and are bridged")
     if np.isfinite(iou).any() and np.nanmedian(iou) < 0.7:
         warnings.append(f"the fitted body overlaps the masks by {np.nanmedian(iou):.2f} only")
+    if not sized:
+        warnings.append(
+            f"nobody said how tall the person is: {stature_m:.2f} m is assumed, and the distance "
+            "with it"
+        )
     return tuple(warnings)
 
 
@@ -232,4 +225,3 @@ def _check(sightings: Sightings, masks: NDArray[np.bool_] | None, camera: Camera
         raise InputError(
             "a pinhole camera", "one with distortion", "Undistort pictures and landmarks first."
         )
-    assert len(LANDMARKS) == sightings.places.shape[1]

@@ -29,57 +29,57 @@ class LandmarkConfig(ConfigurationPart):
 
 
 @dataclass(frozen=True, eq=False)
-class PictureMisfit:
-    """Reprojection; pixels are worth metres at the depth the body was first guessed at."""
+class LandmarkMisfit:
+    """Reprojection and, where landmarks have a place in space, the distance there.
+
+    Pixels are worth metres at the depth the body was first guessed at. In space both bodies are
+    taken from their own middle, in one common scale.
+    """
 
     body: FittableBody
-    regressor: Array  # (21, V)
+    points: Mixtures  # of the mean shape
     sightings: Sightings
     K: Array  # (3, 3)
-    scale: Array  # (T,) metres for each pixel
-    error_m: float
-    outlier: float
+    metres: Array  # (T,) for each pixel
+    configuration: LandmarkConfig
+    picture_error_m: float
 
     def __call__(self, pose: BodyPose) -> System:
-        points = Mixtures.of(self.body, self.regressor, pose.shape)
-        places, by_frame, by_shape = PosedBody.of(self.body, pose).derivatives(points)
+        posed = PosedBody.of(self.body, pose)
+        places, by_frame, by_shape = posed.derivatives(self.points.shaped(pose.shape))
+        clothes = np.zeros((*by_shape.shape[:-1], len(pose.clothes)))
+        by_shared = np.concatenate([by_shape, clothes], axis=-1)
+        total = self._picture(places, by_frame, by_shared)
+        if self.sightings.world is None:
+            return total
+        return total + self._space(self.sightings.world, places, by_frame, by_shared)
+
+    def _picture(self, places: Array, by_frame: Array, by_shared: Array) -> System:
+        outlier = self.configuration.outlier
         pixels, slopes = project(places, self.K)
-        trust = np.sqrt(self.sightings.confidence) * self.scale[:, None] / self.error_m
+        trust = np.sqrt(self.sightings.confidence) * self.metres[:, None] / self.picture_error_m
         off = trust[..., None] * (pixels - self.sightings.places)
-        weight, cost = held_down((off**2).sum(-1), self.outlier)
+        weight, cost = held_down((off**2).sum(-1), outlier)
         slopes = (weight * trust)[..., None, None] * slopes
-        return _stacked(cost, weight[..., None] * off, slopes @ by_frame, slopes @ by_shape, pose)
+        return _stacked(cost, weight[..., None] * off, slopes @ by_frame, slopes @ by_shared)
 
-
-@dataclass(frozen=True, eq=False)
-class SpaceMisfit:
-    """Landmarks in space against the body's, both from their own middle, in one common scale."""
-
-    body: FittableBody
-    regressor: Array
-    sightings: Sightings
-    error_m: float
-    outlier: float
-
-    def __call__(self, pose: BodyPose) -> System:
-        assert self.sightings.world is not None
-        points = Mixtures.of(self.body, self.regressor, pose.shape)
-        derivatives = PosedBody.of(self.body, pose).derivatives(points)
+    def _space(self, seen: Array, *derivatives: Array) -> System:
         trust = self.sightings.confidence
         share = trust / np.maximum(trust.sum(1, keepdims=True), 1e-9)
-        places, by_frame, by_shape = (_centred(part, share) for part in derivatives)
-        seen = _centred(self.sightings.world, share)
-        alike = trust[..., None] * seen
-        size = float((alike * places).sum()) / max(float((alike * seen).sum()), 1e-9)
-        root = np.sqrt(trust)[..., None] / self.error_m
-        off = root * (places - size * seen)
-        weight, cost = held_down((off**2).sum(-1), self.outlier)
-        slope = (weight[..., None] * root)[..., None]
-        return _stacked(cost, weight[..., None] * off, slope * by_frame, slope * by_shape, pose)
+        places, by_frame, by_shared = (_centred(part, share) for part in derivatives)
+        seen = _centred(seen, share)
+        # The body is scaled to what was seen, not the other way: a smaller body is no better.
+        alike = trust[..., None] * places
+        size = float((alike * seen).sum()) / max(float((alike * places).sum()), 1e-9)
+        root = np.sqrt(trust)[..., None] / self.configuration.space_error_m
+        off = root * (size * places - seen)
+        weight, cost = held_down((off**2).sum(-1), self.configuration.outlier)
+        slope = size * (weight[..., None] * root)[..., None]
+        return _stacked(cost, weight[..., None] * off, slope * by_frame, slope * by_shared)
 
 
 def project(places: Array, K: Array) -> tuple[Array, Array]:
-    """Pixels (..., 2) of points in the camera's axes (..., 3), and their derivatives (..., 2, 3)."""
+    """Pixels (..., 2) of points (..., 3) in the camera's axes, and derivatives (..., 2, 3)."""
     depth = np.maximum(places[..., 2:], _NEAR_M)
     pixels = (places @ K.T)[..., :2] / depth
     slopes = (K[:2] - pixels[..., None] * K[2]) / depth[..., None]
@@ -98,13 +98,11 @@ def _centred(values: Array, share: Array) -> Array:
     return values - (weights * values).sum(1, keepdims=True)
 
 
-def _stacked(cost: float, off: Array, by_frame: Array, by_shape: Array, pose: BodyPose) -> System:
+def _stacked(cost: float, off: Array, by_frame: Array, by_shared: Array) -> System:
     frames = len(off)
-    clothes = np.zeros((*by_shape.shape[:-1], len(pose.clothes)))
-    shared = np.concatenate([by_shape, clothes], axis=-1)
     return System.of(
         cost,
         off.reshape(frames, -1),
         by_frame.reshape(frames, -1, by_frame.shape[-1]),
-        shared.reshape(frames, -1, shared.shape[-1]),
+        by_shared.reshape(frames, -1, by_shared.shape[-1]),
     )

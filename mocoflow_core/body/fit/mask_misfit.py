@@ -14,6 +14,7 @@ from mocoflow_core.body.fit.landmark_misfit import project
 from mocoflow_core.body.fit.least_squares import System
 from mocoflow_core.body.fit.posed_body import UNKNOWNS, BodyPose, PosedBody, SkinPoints
 from mocoflow_core.body.outline import EdgeTopology, MaskOutline, match_outlines
+from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.geometry.camera import Camera
 
@@ -46,6 +47,7 @@ class MaskOutlines:
 
     body: FittableBody
     camera: Camera  # at the origin: the body lives in the camera's axes
+    masks: Masks  # (T, h, w)
     outlines: list[MaskOutline]
     configuration: MaskConfig
 
@@ -57,11 +59,14 @@ class MaskOutlines:
         width, height = _working_size(masks, configuration.person_px)
         small = camera.resized(width, height)
         own = replace(small, R=np.eye(3), t=np.zeros(3))
-        outlines = [
-            MaskOutline.of(_resized(mask, width, height), configuration.outline_points)
-            for mask in masks
-        ]
-        return cls(body, own, outlines, configuration)
+        small_masks = np.stack([_resized(mask, width, height) for mask in masks])
+        outlines = [MaskOutline.of(mask, configuration.outline_points) for mask in small_masks]
+        return cls(body, own, small_masks, outlines, configuration)
+
+    def overlaps(self, pose: BodyPose) -> Array:
+        """Intersection over union (T,) with the masks; NaN where a mask is empty."""
+        drawn = silhouettes(PosedBody.of(self.body, pose).vertices(), self.body.faces, self.camera)
+        return np.where(self.masks.any(axis=(1, 2)), overlap(drawn, self.masks), np.nan)
 
     def look(self, pose: BodyPose, outlier_m: float) -> MaskMisfit:
         """The points that belong together as the body stands now."""

@@ -159,14 +159,24 @@ class Mixtures:
     basis: Array  # (N, J, C, 3) how the moment grows with the shape
 
     @classmethod
-    def of(cls, body: FittableBody, mixture: Array, shape: Array) -> Mixtures:
-        """Mixtures (N, V) of vertices at a shape (C,)."""
+    def of(cls, body: FittableBody, mixture: Array, offsets: Array | None = None) -> Mixtures:
+        """Mixtures (N, V) of vertices, in the mean shape.
+
+        Offsets (N, 3) in rest axes are carried by the part that carries most of the point.
+        """
         count = body.weights.shape[1]
         spread = (mixture[:, None, :] * body.weights.T).reshape(-1, mixture.shape[1])
         size = (len(mixture), count)
-        moment = (spread @ body.rest_vertices(shape)).reshape(*size, 3)
+        moment = (spread @ body.vertices).reshape(*size, 3)
         basis = np.moveaxis(spread @ body.vertex_basis, 0, 1)
-        return cls(spread.sum(1).reshape(size), moment, basis.reshape(*size, -1, 3))
+        mass = spread.sum(1).reshape(size)
+        if offsets is not None:
+            moment[np.arange(len(mixture)), mass.argmax(1)] += offsets
+        return cls(mass, moment, basis.reshape(*size, -1, 3))
+
+    def shaped(self, shape: Array) -> Mixtures:
+        """The same in another shape (C,), given the mean's."""
+        return replace(self, moment=self.moment + shape @ self.basis)
 
     def parts(self, posed: PosedBody) -> Array:
         turned = (posed.turns[:, None] @ self.moment[..., None])[..., 0]

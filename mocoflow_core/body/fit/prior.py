@@ -30,6 +30,7 @@ class PriorConfig(ConfigurationPart):
     turning_deg_s2: float = Field(1200.0, gt=0, description="The same of the body's rotation.")
     bending_deg_s2: float = Field(2500.0, gt=0, description="The same of the joints.")
     upright_deg: float = Field(25.0, gt=0, description="Usual lean of the hips where up is known.")
+    error_seconds: float = Field(0.3, gt=0, description="How long errors of landmarks stay alike.")
     clothes_m: float = Field(0.015, gt=0, description="Usual standing off of clothes.")
 
 
@@ -61,7 +62,7 @@ class Prior:
         usual = (pose.angles - FREEDOM.usual) / FREEDOM.spread
         over = (pose.angles - FREEDOM.most).clip(0) + (pose.angles - FREEDOM.least).clip(None, 0)
         beyond = over / limit
-        slopes = np.stack([1 / FREEDOM.spread + 0 * usual, (over != 0) / limit], 1)
+        slopes = np.stack([np.broadcast_to(1 / FREEDOM.spread, usual.shape), (over != 0) / limit], 1)
         count = len(FREEDOM.joint)
         by_frame = np.zeros((frames, 2 * count + 3, UNKNOWNS))
         for kind in range(2):
@@ -124,6 +125,11 @@ class Prior:
             off = self.body.reading(fact.reading, pose.shape) - fact.value
             residuals.append(np.array([off / fact.spread]))
         slopes, off = np.concatenate(rows), np.concatenate(residuals)
+        # Each frame counts in full, although its errors are its neighbours': what is shared by all
+        # frames has to weigh as much more.
+        alike = min(len(pose.places), self.configuration.error_seconds / self.step_s)
+        heavier = np.sqrt(max(1.0, alike))
+        slopes, off = heavier * slopes, heavier * off
         nothing = System.nothing(len(pose.places), UNKNOWNS, shapes + parts)
         return System(
             0.5 * float(off @ off),
@@ -141,7 +147,11 @@ def _second_differences(pose: BodyPose) -> Array:
     turns = pose.rotations[1:] @ np.swapaxes(pose.rotations[:-1], 1, 2)
     turning = Rotation.from_matrix(turns).as_rotvec()
     return np.concatenate(
-        [np.diff(pose.places, 2, axis=0), np.diff(turning, axis=0), np.diff(pose.angles, 2, axis=0)],
+        [
+            np.diff(pose.places, 2, axis=0),
+            np.diff(turning, axis=0),
+            np.diff(pose.angles, 2, axis=0),
+        ],
         axis=1,
     )
 

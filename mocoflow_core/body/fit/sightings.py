@@ -8,7 +8,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.body.fit.fittable_body import LANDMARKS
+from mocoflow_core.body.fit.fittable_body import LANDMARKS, FittableBody
+from mocoflow_core.body.fit.landmark_offsets import BLAZEPOSE_OFFSETS
+from mocoflow_core.body.fit.posed_body import Mixtures
 from mocoflow_core.errors import InputError
 
 Array = NDArray[np.float64]
@@ -26,6 +28,7 @@ class Sightings:
     places: Array  # (T, 21, 2) pixels, corner origin
     confidence: Array  # (T, 21) in [0, 1]
     world: Array | None = None  # (T, 21, 3) metres, the camera's axes, origin and scale unknown
+    offsets: Array | None = None  # (21, 3) from Anny's points to the detector's, metres
 
     @classmethod
     def of(
@@ -36,14 +39,15 @@ class Sightings:
     ) -> Self:
         """From COCO-17 or BlazePose-33: places (T, K, 2), confidence (T, K), world (T, K, 3).
 
-        What is not finite counts as unseen.
+        What is not finite counts as unseen. 33 landmarks are taken where BlazePose sees them, 17
+        where Anny has COCO's.
 
         Raises InputError for other counts, sizes that disagree, and where nobody is seen.
         """
         count = places.shape[1] if places.ndim == 3 else 0
-        shapes = [places.shape[:2] + (2,), confidence.shape + (2,)]
+        shapes = [(*places.shape[:2], 2), (*confidence.shape, 2)]
         if world is not None:
-            shapes.append(world.shape[:2] + (2,))
+            shapes.append((*world.shape[:2], 2))
         if count not in (17, 33) or any(shape != places.shape for shape in shapes):
             raise InputError(
                 "landmarks (T, 17 or 33, 2) with a confidence each",
@@ -60,8 +64,15 @@ class Sightings:
         if world is not None:
             deep = _padded(np.nan_to_num(world[:, chosen]), missing)
         return cls(
-            _padded(np.nan_to_num(places[:, chosen]), missing), _padded(trust, missing), deep
+            _padded(np.nan_to_num(places[:, chosen]), missing),
+            _padded(trust, missing),
+            deep,
+            BLAZEPOSE_OFFSETS if count == 33 else None,
         )
+
+    def points(self, body: FittableBody) -> Mixtures:
+        """The body's points that the detector would see, in the mean shape."""
+        return Mixtures.of(body, body.regressor, self.offsets)
 
     @property
     def seen(self) -> NDArray[np.bool_]:
