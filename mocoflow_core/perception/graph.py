@@ -52,14 +52,14 @@ class GraphNetwork(nn.Module):
     def __init__(self, graph: Graph, weights: Mapping[str, Tensor]) -> None:
         super().__init__()
         self._graph = graph
-        self._weights = {name: tensor.float() for name, tensor in weights.items()}
+        self._weights = {name: _laid_out(tensor.float()) for name, tensor in weights.items()}
         uses = {name: node.name for node in graph.nodes for name in node.takes}
         self._last_use = {name: user for name, user in uses.items() if name not in graph.outputs}
 
     @torch.no_grad()
     def forward(self, pictures: Tensor) -> list[Tensor]:
         """Outputs of pictures (N, C, H, W), in the order of ``Graph.outputs``."""
-        found = {INPUT: pictures}
+        found = {INPUT: _laid_out(pictures)}
         for node in self._graph.nodes:
             found[node.name] = self._evaluate(node, [found[name] for name in node.takes])
             for name in node.takes:
@@ -69,6 +69,8 @@ class GraphNetwork(nn.Module):
 
     def _evaluate(self, node: Node, takes: Sequence[Tensor]) -> Tensor:
         first = takes[0]
+        # Nobody looks at the value again, so that its memory can take the result.
+        spare = node.takes[0] != INPUT and self._last_use.get(node.takes[0]) == node.name
         match node.op:
             case "convolve":
                 weight = self._weights[f"{node.name}.weight"]
@@ -84,11 +86,16 @@ class GraphNetwork(nn.Module):
             case "max_pool":
                 return F.max_pool2d(first, node.kernel, node.stride, node.padding)
             case "leaky_relu":
-                return F.leaky_relu(first, node.slope)
+                return F.leaky_relu(first, node.slope, inplace=spare)
             case "relu":
-                return F.relu(first)
+                return F.relu(first, inplace=spare)
             case "relu6":
-                return F.relu6(first)
+                return F.relu6(first, inplace=spare)
+
+
+def _laid_out(tensor: Tensor) -> Tensor:
+    """Channels beside each other in memory: a tenth to a third faster on a CPU."""
+    return tensor.contiguous(memory_format=torch.channels_last) if tensor.ndim == 4 else tensor
 
 
 def _padded(picture: Tensor, node: Node) -> tuple[Tensor, int]:

@@ -49,10 +49,3 @@ def test_points_doubtful_in_the_render_alone_still_count(pose):
 def test_a_reference_without_a_confident_point_gives_no_number(pose):
     nothing = Keypoints(pose.places, np.zeros(17, np.float32))
     assert np.isnan(centred_oks(pose, nothing, AREA, 0.3))
-
-
-def test_mirroring_twice_changes_nothing_and_once_swaps_the_sides(pose):
-    once = mirrored(pose, 100.0)
-    assert np.allclose(mirrored(once, 100.0).places, pose.places)
-    left, right = COCO17.index("left_knee"), COCO17.index("right_knee")
-    assert np.allclose(once.places[left], [100.0 - pose.places[right, 0], pose.places[right, 1]])

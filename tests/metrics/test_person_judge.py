@@ -63,10 +63,15 @@ def test_a_photograph_without_a_person_is_no_reference(judge):
     assert np.isnan(judge.similarity(found, missing, 800.0))
 
 
-def test_a_mirrored_look_comes_back_to_the_same_place(judge):
-    (sight,) = judge.look_mirrored([block(5, width=25)])
+def test_a_pose_is_in_pixels_of_the_picture_and_not_of_the_border_around_it(judge):
+    (sight,) = judge.look([block(5, width=25)])
     box = sight.pose.places.min(axis=0), sight.pose.places.max(axis=0)
     assert np.allclose(box, [[5, 10], [30, 50]])
+
+
+def test_half_a_pixel_is_all_that_is_wrong_with_a_shifted_photograph(judge):
+    (reference,), (shifted,) = judge.look([block(10)]), judge.look_shifted([block(10)])
+    assert judge.similarity(shifted, reference, 800.0) > 0.97
 
 
 def test_every_number_says_which_networks_gave_it(judge):
