@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mocoflow_core.metrics.oks import SIGMAS, centred_oks, mirrored, oks
+from mocoflow_core.metrics.oks import SIGMAS, centred_oks, oks
 from mocoflow_core.perception.person import COCO17, Keypoints
 
 AREA = 2000.0

@@ -1,38 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
 from mocoflow_core.metrics.person_judge import PersonJudge, PersonScoreConfig, open_networks
 from mocoflow_core.perception.nanodet import NanoDet
-from mocoflow_core.perception.person import Boxes, Keypoints
+from tests.dark_person import DarkPerson
 
 CONFIGURATION = PersonScoreConfig()
-
-
-class DarkPerson:
-    """Detects the dark pixels as the person: a detector that is exact and cheap."""
-
-    name = "dark pixels"
-    digest = "0" * 64
-
-    def boxes(self, images: Sequence[np.ndarray]) -> list[Boxes]:
-        found = []
-        for image in images:
-            y, x = np.nonzero(image.mean(axis=2) < 128)
-            corners = [[x.min(), y.min(), x.max() + 1, y.max() + 1]] if len(x) else []
-            confidence = np.ones(len(corners), np.float32)
-            found.append(Boxes(np.array(corners, np.float32).reshape(-1, 4), confidence))
-        return found
-
-    def keypoints(self, images, boxes) -> list[Keypoints | None]:
-        steps = np.linspace(0, 1, 17)[:, None]
-        return [
-            Keypoints((box[:2] + steps * (box[2:] - box[:2])).astype(np.float32), np.ones(17))
-            for box in boxes
-        ]
 
 
 @pytest.fixture
