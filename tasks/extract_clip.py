@@ -13,7 +13,7 @@ from mocoflow_core.capture.strange_frames import sound_clip
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # What is behind the person can be replaced; shadows are measured.
+ALGORITHM_VERSION = 5  # Half covered pixels stay before the plate.
 
 
 @stage(ClipArtifact, ALGORITHM_VERSION)

@@ -13,7 +13,7 @@ from mocoflow_core.capture.scene import open_scene
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # What is behind the person can be replaced.
 
 
 @stage(EvaluationArtifact, ALGORITHM_VERSION)

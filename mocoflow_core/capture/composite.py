@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,8 +21,11 @@ from mocoflow_core.capture.strange_frames import listed
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.capture.working_pictures import source_mask
 
+Picture = NDArray[np.uint8]
 BehindPerson = Literal["kept", "plate", "white"]
 WHITE = 255
+# Without it a person of 96 pixels was learned 0.2 dB worse.
+RIM_PX = 1
 
 
 def composite_clip(
@@ -31,8 +35,8 @@ def composite_clip(
 
     The mask cuts hard, at the size of the files, before pictures shrink: pixels inside stay as
     they are, those outside become the new background exactly, and working pixels on the edge mix
-    the two by area. A feathered edge would bring back what was behind the person, and the shadow
-    at the feet is darkest there.
+    the two by area. Before the plate the cut is ``RIM_PX`` wider: those pixels show up to half of
+    the person, on what the plate shows too. Before white they would show what was behind.
 
     A frame whose mask is unknown stays as it is before the plate and is left out before white.
 
@@ -48,7 +52,11 @@ def composite_clip(
     if behind == "white":
         background = np.full_like(background, WHITE)
     frames = np.array(clip.frames)
-    cut = _cut_by_files(scene, clip, mask_files) if mask_files else _cut_by_masks(clip)
+    rim_px = RIM_PX if behind == "plate" else 0
+    if mask_files:
+        cut = _cut_by_files(scene, clip, mask_files, rim_px)
+    else:
+        cut = _cut_by_masks(clip, rim_px)
     for row, (person, coverage) in enumerate(cut):
         if clip.has_mask[row]:
             rest = (1 - coverage[..., None] / 255) * background
@@ -66,19 +74,25 @@ def _with_known_masks(clip: Clip, behind: BehindPerson) -> tuple[Clip, tuple[str
     return clip.at_rows(clip.has_mask), (f"{named} left out: no mask says what is not white",)
 
 
-def _cut_by_masks(clip: Clip) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
+def _cut_by_masks(clip: Clip, rim_px: int) -> Iterator[tuple[Picture, Picture]]:
+    """The person on black (H, W, 3) and its coverage (H, W) of 0 to 255, at the working size."""
     for frame, mask in zip(clip.frames, clip.masks, strict=True):
-        coverage = np.where(mask, np.uint8(255), np.uint8(0))
-        yield np.where(mask[..., None], frame, np.uint8(0)), coverage
+        yield _cut(np.asarray(frame), np.asarray(mask), rim_px)
 
 
 def _cut_by_files(
-    scene: Scene, clip: Clip, files: dict[int, Path]
-) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
-    """The person on black (H, W, 3) and its coverage (H, W) of 0 to 255, at the working size."""
+    scene: Scene, clip: Clip, files: dict[int, Path], rim_px: int
+) -> Iterator[tuple[Picture, Picture]]:
+    """The same, cut at the size of the files."""
     name = clip.camera.name
     view = WorkingView(scene.cameras[name], clip.camera)
     for number, picture in scene.frames(name).read(clip.frame_indices.tolist()):
-        inside = source_mask(files[number], view) > 127
-        person = np.where(inside[..., None], picture, np.uint8(0))
-        yield view.image(person), view.image(np.where(inside, np.uint8(255), np.uint8(0)))
+        person, coverage = _cut(picture, source_mask(files[number], view) > 127, rim_px)
+        yield view.image(person), view.image(coverage)
+
+
+def _cut(picture: Picture, mask: NDArray[np.bool_], rim_px: int) -> tuple[Picture, Picture]:
+    side = 2 * rim_px + 1
+    inside = cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
+    person = np.where(inside[..., None], picture, np.uint8(0))
+    return person, np.where(inside, np.uint8(255), np.uint8(0))

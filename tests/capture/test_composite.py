@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.capture.composite import composite_clip
+from mocoflow_core.capture.composite import RIM_PX, composite_clip
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip, extract_evaluation
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.capture.shadows import shadow, shadowed_area
@@ -39,6 +39,22 @@ def composited(scene: Scene, behind, max_side: int = 512) -> tuple[Clip, Clip]:
     return seen, composite_clip(scene, seen, behind, scene.masks("cam00"))
 
 
+def beyond(masks, behind):
+    """Pixels that belong to the background alone: before the plate all but a rim."""
+    if behind == "white":
+        return ~masks
+    rim = np.ones((2 * RIM_PX + 1,) * 2, np.uint8)
+    return np.stack([cv2.dilate(mask.astype(np.uint8), rim) == 0 for mask in masks])
+
+
+def test_half_covered_pixels_stay_before_the_plate_and_go_before_white(scene):
+    seen, plate = composited(scene, "plate")
+    rim = ~seen.masks & ~beyond(seen.masks, "plate")
+    assert np.array_equal(plate.frames[rim], seen.frames[rim])
+    _, white = composited(scene, "white")
+    assert (white.frames[rim] == 255).all()
+
+
 def test_kept_is_the_clip_itself(scene):
     seen, kept = composited(scene, "kept")
     assert kept is seen
@@ -52,8 +68,9 @@ def test_the_person_stays_and_everything_else_is_the_background(scene, behind, f
     expected = seen.background if behind == "plate" else np.full_like(seen.background, 255)
     assert np.array_equal(clip.background, expected)
     assert np.array_equal(clip.frames[clip.masks], seen.frames[seen.masks])
+    outside = beyond(clip.masks, behind)
     everywhere = np.broadcast_to(expected, clip.frames.shape)
-    assert np.array_equal(clip.frames[~clip.masks], everywhere[~clip.masks])
+    assert np.array_equal(clip.frames[outside], everywhere[outside])
 
 
 def test_working_pixels_on_the_edge_mix_by_the_area_of_the_person(scene):
@@ -90,8 +107,9 @@ def test_evaluation_cameras_are_treated_as_the_train_camera(scene, behind):
     [seen] = extract_evaluation(scene, wanted, CaptureConfig())
     [clip] = extract_evaluation(scene, wanted, CaptureConfig(behind_person=behind))
     assert np.array_equal(clip.frames[clip.masks], seen.frames[seen.masks])
+    outside = beyond(clip.masks, behind)
     everywhere = np.broadcast_to(clip.background, clip.frames.shape)
-    assert np.array_equal(clip.frames[~clip.masks], everywhere[~clip.masks])
+    assert np.array_equal(clip.frames[outside], everywhere[outside])
 
 
 def test_a_frame_with_an_unknown_mask_stays_before_the_plate_and_is_left_out_before_white(scene):

@@ -29,10 +29,13 @@ MAY_HOLD = (
 
 def admitted(module: object, name: object) -> Admitted:
     """What stands for a global name. Raises InputError for all that are not in the table."""
+    # Anything else must not even be printed: its text may be endless.
+    if not isinstance(module, str) or not isinstance(name, str):
+        raise damaged("a name that is no text")
     full_name = f"{module}.{name}"
     if full_name in _NAMES:
         return _NAMES[full_name]
-    if isinstance(module, str) and module.split(".")[0] == "chumpy":
+    if module.split(".")[0] == "chumpy":
         return Admitted(full_name, new=StateRecord)
     raise forbidden(full_name)
 
@@ -73,7 +76,7 @@ def _latin1(arguments: Sequence[object], machine: Machine) -> bytes:
     """``_codecs.encode(text, 'latin1')``, as protocol 2 spells bytes; no other codec."""
     text, codec = arguments
     if not isinstance(text, str) or codec not in ("latin1", "latin-1"):
-        raise forbidden(f"_codecs.encode with codec {codec!r}")
+        raise forbidden("_codecs.encode with another codec than latin1")
     return text.encode("latin1")
 
 

@@ -37,9 +37,10 @@ def plain_dtype(code: object) -> np.dtype | None:
         return None
     if isinstance(text, str) and _NUMBER.fullmatch(text):
         return np.dtype(text)
+    found = repr(text[:80]) if isinstance(text, str) else type(text).__name__
     raise InputError(
         "its arrays must hold booleans, numbers or text",
-        f"an array of type {str(code)[:80]!r}",
+        f"an array of type {found}",
         "Save plain arrays.",
     )
 

@@ -37,7 +37,9 @@ def read_torch_stream(
 
     value = nested(stream, outside)
     keys = nested(stream, None)
-    if not isinstance(keys, list) or set(keys) != set(storages) or len(keys) != len(storages):
+    if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
+        raise damaged("a torch file without a list of its tensors")
+    if len(keys) != len(storages) or set(keys) != set(storages):
         raise damaged("a torch file whose tensors are not those it lists")
     for key in keys:
         _fill(storages[key], stream)

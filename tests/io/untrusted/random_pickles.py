@@ -24,7 +24,6 @@ GLOBALS = (
     b"ctorch._utils\n_rebuild_tensor_v2\n",
     b"ctorch.storage\n_load_from_bytes\n",
     b"ctorch\nFloatStorage\n",
-    b"cos\nsystem\n",
 )
 VALUES = (
     b"N",
@@ -61,11 +60,6 @@ VALUES = (
     b"\x96\x08\x00\x00\x00\x00\x00\x00\x00" + bytes(8),
     b"X\x06\x00\x00\x00latin1",
 )
-ACTIONS = (
-    *(b"(", b"(", b"0", b"1", b"2", b"t", b"l", b"d", b"a", b"e", b"s", b"u", b"R", b"R", b"R"),
-    *(b"b", b"b", b"\x81", b"\x81", b"\x85", b"\x86", b"\x87", b"\x94", b"\x93", b"\x90", b"\x91"),
-    *(b"q\x00", b"q\x01", b"h\x00", b"h\x01", b"Q", b"o", b"\x8f", b"."),
-)
 # Whole objects, to be taken apart by what follows.
 OBJECTS = (
     b"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(K\x00tU\x01btR",
@@ -77,8 +71,66 @@ OBJECTS = (
 )
 
 
+# What an instruction takes off the stack and leaves there; below a mark nothing is taken.
+ACTIONS = {
+    b"R": (("global", "tuple"), "object"),
+    b"\x81": (("global", "tuple"), "object"),
+    b"b": (("object", "any"), "object"),
+    b"a": (("list", "any"), "list"),
+    b"s": (("dict", "any", "any"), "dict"),
+    b"\x85": (("any",), "tuple"),
+    b"\x86": (("any", "any"), "tuple"),
+    b"\x87": (("any", "any", "any"), "tuple"),
+    b"0": (("any",), None),
+    b"2": (("any",), "any any"),
+}
+GATHERING = {b"t": "tuple", b"l": "list", b"d": "dict", b"\x91": "list"}
+KINDS = {b"]": "list", b"}": "dict", b")": "tuple", b"\x8f": "list"}
+NONSENSE = 0.02  # the share of instructions that need not fit
+
+
 def random_pickle(random: Random) -> bytes:
-    """A few dozen instructions, mostly in an order that makes some sense."""
-    pools = (VALUES, VALUES, ACTIONS, ACTIONS, GLOBALS, OBJECTS)
-    parts = [random.choice(random.choice(pools)) for _ in range(random.randrange(1, 60))]
-    return b"\x80\x02" + b"".join(parts) + b"."
+    """Some dozen instructions, nearly all of which find on the stack what they take."""
+    stack, parts = [], [b"\x80\x02"]
+    for _ in range(random.randrange(1, 80)):
+        parts.append(_step(random, stack))
+        if random.random() < 0.1 and stack and stack[-1] != "mark":
+            parts.append(b"q" + bytes([random.randrange(4)]))
+    while "mark" in stack:
+        parts.append(b"t")
+        del stack[len(stack) - 1 - stack[::-1].index("mark") :]
+    return b"".join(parts) + b"."
+
+
+def _step(random: Random, stack: list[str]) -> bytes:
+    """One instruction, and its effect on the kinds of values on the stack."""
+    if random.random() < NONSENSE:
+        return random.choice(
+            [*ACTIONS, *GATHERING, b"u", b"e", b"h\x00", b"h\x01", b"1", b"o", b"Q", b"\x93"]
+        )
+    fitting = [code for code, (taken, _) in ACTIONS.items() if _fits(stack, taken)]
+    if fitting and random.random() < 0.5:
+        code = random.choice(fitting)
+        taken, left = ACTIONS[code]
+        del stack[len(stack) - len(taken) :]
+        stack += left.split() if left else []
+        return code
+    if "mark" in stack and random.random() < 0.15:
+        code = random.choice(list(GATHERING))
+        del stack[len(stack) - 1 - stack[::-1].index("mark") :]
+        stack.append(GATHERING[code])
+        return code
+    if random.random() < 0.1:
+        stack.append("mark")
+        return b"("
+    pool, kind = random.choice(((VALUES, "any"), (GLOBALS, "global"), (OBJECTS, "object")))
+    code = random.choice(pool)
+    stack.append(KINDS.get(code, kind))
+    return code
+
+
+def _fits(stack: list[str], taken: tuple[str, ...]) -> bool:
+    top = stack[len(stack) - len(taken) :]
+    return len(top) == len(taken) and all(
+        have != "mark" and want in ("any", have) for want, have in zip(taken, top, strict=True)
+    )

@@ -73,6 +73,31 @@ def test_keys_of_tuples_that_take_for_ever_to_hash(refused):
     refused(nested.replace(b"\x80\x02", b"\x80\x02}", 1) + b"Ns.", "text or whole numbers as keys")
 
 
+def test_what_takes_for_ever_to_print_or_to_compare_is_neither(refused):
+    endless = _laughs(60, b"(K\x01t", b"t")[2:-1]
+    for use in (
+        endless + b"U\x01a\x93",
+        b"U\x02os" + endless + b"\x93",
+        b"c_codecs\nencode\n(U\x01a" + endless + b"tR",
+        b"cnumpy\ndtype\n(" + endless + b"tR",
+        b"cnumpy\ndtype\n(U\x02f8tR(K\x03"
+        + endless
+        + b"NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\x00tb",
+        b"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n" + endless + b"U\x01btR",
+        b"ccollections\ndefaultdict\n(" + endless + b"tR",
+        b"ccopy_reg\n_reconstructor\n(cchumpy.ch\nCh\n" + endless + b"NtR",
+        b"cchumpy.ch\nCh\n" + endless + b"\x81",
+        endless + b"Q",
+    ):
+        refused(b"\x80\x02" + use + b".")
+    empty = io.BytesIO()
+    torch.save(None, empty, _use_new_zipfile_serialization=False)
+    listing = b"\x80\x02]q\x00."
+    data = empty.getvalue()
+    assert data.endswith(listing)
+    refused(data.removesuffix(listing) + b"\x80\x02(" + endless + b"l.", "list of its tensors")
+
+
 @pytest.mark.parametrize("depth", [100, 50_000])
 def test_deep_nesting(refused, depth):
     refused(b"\x80\x02" + b"]" * depth + b"a" * (depth - 1) + b".", "nested at most 64 deep|items")
