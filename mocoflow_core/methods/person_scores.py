@@ -92,8 +92,8 @@ def person_rows(
 ) -> list[ScoreRow]:
     """``plausibility`` and ``oks`` of each method, and of the photographs themselves.
 
-    A photograph's OKS is that of its flipped copy, the pose flipped back: what the detectors
-    alone are off by. Views whose photograph has no pose have no OKS; the protocol counts them.
+    A photograph's OKS is that of a copy shifted by half a pixel: what the detectors alone are off
+    by. Views whose photograph has no pose have no OKS; the protocol counts them.
 
     Args:
         cuts: the views that the detectors look at.
@@ -102,7 +102,7 @@ def person_rows(
     photographs = [cut.picture for cut in cuts]
     table = _Table(subject, cuts, judge, judge.look(photographs), of_views)
     rows = table.plausibility(PHOTOGRAPH, table.references)
-    rows += table.oks(PHOTOGRAPH, judge.look_mirrored(photographs))
+    rows += table.oks(PHOTOGRAPH, judge.look_shifted(photographs))
     for method, renderer in renderers.items():
         sights = judge.look([cut.render(renderer) for cut in cuts])
         rows += table.plausibility(method, sights) + table.oks(method, sights)
@@ -130,8 +130,8 @@ class _Table:
         known = [self.judge.has_reference(reference) for reference in self.references]
         protocol = (
             f"{self._pictures()}; {self.judge.oks_protocol()}; {known.count(False)} of "
-            f"{len(known)} views left out, no pose in the photograph; {PHOTOGRAPH}: its mirrored "
-            "copy, the pose mirrored back"
+            f"{len(known)} views left out, no pose in the photograph; {PHOTOGRAPH}: a copy "
+            "shifted by half a pixel"
         )
         return [
             _row(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.perception.person import COCO17, Keypoints
+from mocoflow_core.perception.person import Keypoints
 
 # COCO's own standard deviations in the order of ``COCO17``, as shares of the object's scale.
 SIGMAS = np.array(
@@ -49,18 +49,5 @@ def oks(
     return float(np.exp(-squares / (2.0 * area_px * variances)).mean())
 
 
-def mirrored(pose: Keypoints, width: float) -> Keypoints:
-    """The pose that is seen in the picture of this width flipped left to right."""
-    names = [_other_side(name) for name in COCO17]
-    order = [COCO17.index(name) for name in names]
-    places = pose.places[order] * np.array([-1.0, 1.0], np.float32)
-    return Keypoints(places + np.array([width, 0.0], np.float32), pose.confidence[order])
-
-
 def _about_mean(pose: Keypoints, known: NDArray[np.bool_]) -> NDArray[np.float32]:
     return np.asarray(pose.places - pose.places[known].mean(axis=0), np.float32)
-
-
-def _other_side(name: str) -> str:
-    side, _, part = name.partition("_")
-    return {"left": f"right_{part}", "right": f"left_{part}"}.get(side, name)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
+import cv2
 import numpy as np
 from pydantic import Field
 
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
-from mocoflow_core.metrics.oks import centred_oks, mirrored
+from mocoflow_core.metrics.oks import centred_oks
 from mocoflow_core.metrics.perceptual import LpipsAlex
 from mocoflow_core.metrics.plausibility import person_box
 from mocoflow_core.perception.movenet import MoveNetThunder
@@ -32,13 +33,19 @@ class PersonScoreConfig(ConfigurationPart):
         "are absent, with the reason beside the others; off: none of them.",
     )
     views: int = Field(
-        24, ge=1, description="Views that the detectors look at, drawn once by evaluation.seed."
+        20, ge=1, description="Views that the detectors look at, drawn once by evaluation.seed."
     )
     confidence: float = Field(
         0.5, gt=0.0, le=1.0, description="A box counts as a person from this confidence on."
     )
     least_area: float = Field(
-        0.05, ge=0.0, le=1.0, description="And from this share of the picture on."
+        0.02, ge=0.0, le=1.0, description="And from this share of the picture on."
+    )
+    surround: float = Field(
+        1.6,
+        ge=1.0,
+        description="The detectors look at the crop in a white border, so many times as wide: "
+        "a person who fills the picture is found less surely.",
     )
     keypoint_confidence: float = Field(
         0.3, gt=0.0, le=1.0, description="Points of the photograph that OKS compares."
@@ -72,6 +79,8 @@ class PersonJudge:
 
     def look(self, pictures: Sequence[Picture]) -> list[Sight]:
         """One sight of each picture (H, W, 3), its most confident person."""
+        borders = [self._border(picture) for picture in pictures]
+        framed = [_framed(picture, px) for picture, px in zip(pictures, borders, strict=True)]
         chosen = [
             person_box(
                 boxes,
@@ -79,24 +88,24 @@ class PersonJudge:
                 self._configuration.confidence,
                 self._configuration.least_area,
             )
-            for picture, boxes in zip(pictures, self._detector.boxes(pictures), strict=True)
+            for picture, boxes in zip(framed, self._detector.boxes(framed), strict=True)
         ]
         found = [row for row, box in enumerate(chosen) if box is not None]
         poses = self._keypoints.keypoints(
-            [pictures[row] for row in found], [box for box in chosen if box is not None]
+            [framed[row] for row in found], [box for box in chosen if box is not None]
         )
         by_row = dict(zip(found, poses, strict=True))
-        return [Sight(row in by_row, by_row.get(row)) for row in range(len(pictures))]
-
-    def look_mirrored(self, pictures: Sequence[Picture]) -> list[Sight]:
-        """Sights of the pictures flipped left to right, their poses flipped back."""
-        sights = self.look([np.ascontiguousarray(picture[:, ::-1]) for picture in pictures])
         return [
-            sight
-            if sight.pose is None
-            else sight._replace(pose=mirrored(sight.pose, picture.shape[1]))
-            for sight, picture in zip(sights, pictures, strict=True)
+            Sight(row in by_row, _without_border(by_row.get(row), px))
+            for row, px in enumerate(borders)
         ]
+
+    def look_shifted(self, pictures: Sequence[Picture]) -> list[Sight]:
+        """Sights of the pictures shifted by half a pixel: nothing else about them is wrong."""
+        return self.look([_half_a_pixel_off(picture) for picture in pictures])
+
+    def _border(self, picture: Picture) -> int:
+        return round(0.5 * (self._configuration.surround - 1.0) * max(picture.shape[:2]))
 
     def has_reference(self, sight: Sight) -> bool:
         """Whether a photograph's pose has points to compare with."""
@@ -117,7 +126,8 @@ class PersonJudge:
         chosen, detector = self._configuration, self._detector
         return (
             f"person: {detector.name} {detector.digest[:12]}, confidence from "
-            f"{chosen.confidence:g}, box from {chosen.least_area:g} of the picture"
+            f"{chosen.confidence:g}, box from {chosen.least_area:g} of the picture, which is "
+            f"{chosen.surround:g} crops wide, white around, scaled to the network"
         )
 
     def keypoints_name(self) -> str:
@@ -134,6 +144,22 @@ class PersonJudge:
             "each pose about their mean, COCO sigmas, area of the truth mask; 0 without a person "
             "in the render"
         )
+
+
+def _framed(picture: Picture, border_px: int) -> Picture:
+    sides = ((border_px, border_px), (border_px, border_px), (0, 0))
+    return np.pad(picture, sides, constant_values=255)
+
+
+def _without_border(pose: Keypoints | None, border_px: int) -> Keypoints | None:
+    """A pose of the framed picture as one of the picture."""
+    return pose and Keypoints(pose.places - np.float32(border_px), pose.confidence)
+
+
+def _half_a_pixel_off(picture: Picture) -> Picture:
+    move = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5]])
+    size = (picture.shape[1], picture.shape[0])
+    return np.asarray(cv2.warpAffine(picture, move, size, borderMode=cv2.BORDER_REPLICATE))
 
 
 class Networks(NamedTuple):

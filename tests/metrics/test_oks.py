@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mocoflow_core.metrics.oks import SIGMAS, centred_oks, mirrored, oks
+from mocoflow_core.metrics.oks import SIGMAS, centred_oks, oks
 from mocoflow_core.perception.person import COCO17, Keypoints
 
 AREA = 2000.0
@@ -49,10 +49,3 @@ def test_points_doubtful_in_the_render_alone_still_count(pose):
 def test_a_reference_without_a_confident_point_gives_no_number(pose):
     nothing = Keypoints(pose.places, np.zeros(17, np.float32))
     assert np.isnan(centred_oks(pose, nothing, AREA, 0.3))
-
-
-def test_mirroring_twice_changes_nothing_and_once_swaps_the_sides(pose):
-    once = mirrored(pose, 100.0)
-    assert np.allclose(mirrored(once, 100.0).places, pose.places)
-    left, right = COCO17.index("left_knee"), COCO17.index("right_knee")
-    assert np.allclose(once.places[left], [100.0 - pose.places[right, 0], pose.places[right, 1]])

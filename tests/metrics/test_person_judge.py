@@ -1,38 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
 from mocoflow_core.metrics.person_judge import PersonJudge, PersonScoreConfig, open_networks
 from mocoflow_core.perception.nanodet import NanoDet
-from mocoflow_core.perception.person import Boxes, Keypoints
+from tests.dark_person import DarkPerson
 
 CONFIGURATION = PersonScoreConfig()
-
-
-class DarkPerson:
-    """Detects the dark pixels as the person: a detector that is exact and cheap."""
-
-    name = "dark pixels"
-    digest = "0" * 64
-
-    def boxes(self, images: Sequence[np.ndarray]) -> list[Boxes]:
-        found = []
-        for image in images:
-            y, x = np.nonzero(image.mean(axis=2) < 128)
-            corners = [[x.min(), y.min(), x.max() + 1, y.max() + 1]] if len(x) else []
-            confidence = np.ones(len(corners), np.float32)
-            found.append(Boxes(np.array(corners, np.float32).reshape(-1, 4), confidence))
-        return found
-
-    def keypoints(self, images, boxes) -> list[Keypoints | None]:
-        steps = np.linspace(0, 1, 17)[:, None]
-        return [
-            Keypoints((box[:2] + steps * (box[2:] - box[:2])).astype(np.float32), np.ones(17))
-            for box in boxes
-        ]
 
 
 @pytest.fixture
@@ -63,10 +38,15 @@ def test_a_photograph_without_a_person_is_no_reference(judge):
     assert np.isnan(judge.similarity(found, missing, 800.0))
 
 
-def test_a_mirrored_look_comes_back_to_the_same_place(judge):
-    (sight,) = judge.look_mirrored([block(5, width=25)])
+def test_a_pose_is_in_pixels_of_the_picture_and_not_of_the_border_around_it(judge):
+    (sight,) = judge.look([block(5, width=25)])
     box = sight.pose.places.min(axis=0), sight.pose.places.max(axis=0)
     assert np.allclose(box, [[5, 10], [30, 50]])
+
+
+def test_half_a_pixel_is_all_that_is_wrong_with_a_shifted_photograph(judge):
+    (reference,), (shifted,) = judge.look([block(10)]), judge.look_shifted([block(10)])
+    assert judge.similarity(shifted, reference, 800.0) > 0.97
 
 
 def test_every_number_says_which_networks_gave_it(judge):
