@@ -67,7 +67,7 @@ class GraphNetwork(nn.Module):
         super().__init__()
         self._graph = graph
         for name, tensor in weights.items():
-            node, part = name.split(".")
+            node, _, part = name.rpartition(".")
             scale = weights.get(f"{node}.scale", 1.0) if part == "weight" else 1.0
             self.register_buffer(f"{node}_{part}", _laid_out(tensor.float() * scale))
         uses = {name: node.name for node in graph.nodes for name in node.takes}

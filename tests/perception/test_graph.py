@@ -87,3 +87,29 @@ def test_a_file_is_the_whole_network(tmp_path):
     path = tmp_path / "net.safetensors"
     save_file({"unused": np.zeros(1, np.float32)}, path, {"graph": graph.model_dump_json()})
     assert graph_network(read_weights(path))(picture())[0].max() == 6.0
+
+
+def test_four_groups_of_channels_become_blocks_of_pixels():
+    values = torch.arange(8.0).view(1, 8, 1, 1)
+    graph = Graph(nodes=(Node(name="a", op="depth_to_space", takes=("input",)),), outputs=("a",))
+    (spread,) = GraphNetwork(graph, {})(values)
+    assert spread[0].tolist() == [[[0, 2], [4, 6]], [[1, 3], [5, 7]]]
+
+
+def test_widening_adds_empty_channels():
+    node = Node(name="a", op="widen", takes=("input",), channels=2)
+    (wide,) = GraphNetwork(Graph(nodes=(node,), outputs=("a",)), {})(torch.ones(1, 3, 4, 5))
+    assert wide.shape == (1, 5, 4, 5)
+    assert wide[0, :3].min() == 1
+    assert wide[0, 3:].max() == 0
+
+
+def test_weights_stored_as_bytes_are_steps_of_a_scale():
+    node = Node(name="a", op="convolve", takes=("input",))
+    weights = {
+        "a.weight": torch.tensor([[[[100]]], [[[-50]]]], dtype=torch.int8),
+        "a.scale": torch.tensor([0.01, 0.1]).view(2, 1, 1, 1),
+        "a.bias": torch.tensor([0.0, 1.0]),
+    }
+    (found,) = GraphNetwork(Graph(nodes=(node,), outputs=("a",)), weights)(torch.ones(1, 1, 1, 1))
+    assert found.flatten().tolist() == pytest.approx([1.0, -4.0])
