@@ -61,6 +61,12 @@ class SceneDescription(_Part):
     working_fps: float = Field(
         12.0, gt=0, allow_inf_nan=False, description="Rate to learn from; the paper's (sec. 4)."
     )
+    source_begins_at: int | None = Field(
+        None,
+        ge=0,
+        description="Where frames were cut out of a longer recording and keep its numbers: the "
+        "number of its first frame. Null: the frames are all there is.",
+    )
     world: WorldDescription
     train_camera: str
     cameras: dict[str, CameraDescription]

@@ -83,4 +83,5 @@ class DatasetScene:
     license: str
     attribution: str
     remarks: tuple[str, ...] = ()
+    source_begins_at: int = 0  # the first number of the recording that the clip was cut out of
     working_fps: float | None = None  # to learn from; by default the paper's 12

@@ -15,7 +15,7 @@ from mocoflow_core.settings import with_settings
 
 Progress = Callable[[float, str], None]
 # Counts up when the same files give another scene folder.
-ALGORITHM_VERSION = 1
+ALGORITHM_VERSION = 2  # scene.json says that numbers are the source's.
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,8 @@ def read_zju_mocap(
     annotations = read_annotations(source, configuration.camera_unit)
     train = choose_camera(annotations, configuration.train_camera)
     subject = subject_of([source.resolve().name, *annotations.pictures[train].values()])
-    clip, clip_remarks = _clip(source, annotations, train, subject, configuration)
+    pictures, masked = recorded_frames(source, annotations, train, configuration.masks)
+    clip, clip_remarks = _clip(pictures, masked, subject, configuration)
     meshes, body_remarks = read_bodies(source, clip, _body_source(configuration))
     clip, trim_remarks = _with_bodies(clip, meshes)
     cameras, camera_remarks = _cameras(source, annotations, train, clip, configuration)
@@ -99,19 +100,15 @@ def read_zju_mocap(
             *(rate_remark, *clip_remarks, *body_remarks, *trim_remarks, *camera_remarks),
             *up_remarks,
         ),
+        source_begins_at=int(pictures[0]),
         working_fps=configuration.fps / configuration.stride,
     )
 
 
 def _clip(
-    folder: Path,
-    annotations: ZjuAnnotations,
-    train: str,
-    subject: str | None,
-    configuration: ZjuMocapConfig,
+    pictures: Indices, masked: Indices, subject: str | None, configuration: ZjuMocapConfig
 ) -> tuple[Indices, tuple[str, ...]]:
     wanted = chosen_range(subject, configuration.first_frame, configuration.frames)
-    pictures, masked = recorded_frames(folder, annotations, train, configuration.masks)
     clip, remarks = unbroken_clip(wanted, pictures, masked)
     return clip, (*remarks, *bad_masks(subject, clip))
 

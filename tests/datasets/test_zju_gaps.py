@@ -145,5 +145,6 @@ def test_313_counts_from_1_in_pictures_masks_and_bodies(tmp_path):
     assert scene.train_camera == "Camera_1"
     assert len(scene.cameras) == 21
     assert train_frames(scene) == [1, 2, 3]
+    assert scene.source_begins_at == 1
     assert scene.meshes.sequence.frame_indices.tolist() == [1, 2, 3]
     assert_allclose(scene.cameras["Camera_22"].camera.t, filmed.cameras["Camera (22)"].t)
