@@ -185,7 +185,7 @@ def _cameras(
     remarks = ["masks are the user's" if choice.masks else made]
     for name in dict.fromkeys(names):
         ticks = clip[::stride] if cameras else clip
-        cameras[name], said = open_view(files, calibrated[name], ticks, choice)
+        cameras[name], said = open_view(files, calibrated[name], ticks, clip[::stride], choice)
         remarks += said
     return cameras, tuple(remarks)
 

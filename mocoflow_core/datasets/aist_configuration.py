@@ -61,7 +61,9 @@ class AistConfig(ConfigurationPart):
     background: Background = Field(
         "plate", description="Around the person: the clip's median (no shadows), or as filmed."
     )
-    plate_frames: int = Field(48, ge=1, description="Frames that make the median, over the clip.")
+    plate_frames: int = Field(
+        48, ge=1, description="Frames that make the median, of those learned from."
+    )
     difference_threshold: int = Field(
         30, ge=1, le=255, description="Difference to the plate that counts as the person, 1/255."
     )

@@ -92,9 +92,9 @@ def available_ticks(video: Path, rounding: Rounding) -> tuple[Indices, tuple[str
 
 
 def open_view(
-    files: AistFiles, camera: Camera, wanted: Indices, choice: ViewChoice
+    files: AistFiles, camera: Camera, wanted: Indices, learned: Indices, choice: ViewChoice
 ) -> tuple[DatasetCamera, tuple[str, ...]]:
-    """One camera with those of the wanted ticks that its video has.
+    """One camera with those of the wanted ticks that its video has; its plate is of the learned.
 
     Raises InputError for a video of another shape, and for masks that are not where they should.
     """
@@ -111,7 +111,7 @@ def open_view(
     if choice.masks:
         masks = masks_in_folder(choice.masks / video.stem, frames)
     bodies = BodyRegions(choice.bodies, fitted) if choice.bodies else None
-    plate = clip_plate(frames, masks, bodies, choice.plate)
+    plate = clip_plate(frames, masks, bodies, choice.plate, learned)
     masks = masks or DifferenceMasks(frames, plate, choice.plate.threshold, bodies)
     shown: FrameSource = frames
     if choice.background == "plate":
