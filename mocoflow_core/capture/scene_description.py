@@ -74,6 +74,7 @@ class SceneDescription(_Part):
     truth: TruthDescription | None = None
     license: str = ""
     attribution: str = ""
+    remarks: list[str] = Field([], description="For whoever reads the scores; on the report.")
 
 
 def read_description(file: Path) -> SceneDescription:

@@ -24,6 +24,7 @@ from mocoflow_core.datasets.aist_views import (
     train_view,
 )
 from mocoflow_core.datasets.camera_up import up_of_cameras
+from mocoflow_core.datasets.caveats import of_masks_near, of_multi_view_bodies
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.aist_motion import METRES, Motion, read_motion
@@ -90,6 +91,10 @@ def read_aist(
         license=LICENSE,
         attribution=ATTRIBUTION,
         remarks=(*remarks, *body_remarks, *truth_remarks, *up_remarks, *_floor(meshes, up)),
+        caveats=(
+            *of_multi_view_bodies(meshes),
+            *(() if configuration.masks else of_masks_near(meshes)),
+        ),
         working_fps=GRID_FPS / configuration.stride,
     )
 

@@ -70,7 +70,8 @@ class DatasetScene:
 
     The train camera has every frame from its first to its last, as held-out frames lie between
     those that are learned from; ``working_fps`` thins them out. Other cameras may have gaps.
-    ``remarks`` say everything that was assumed, chosen, skipped or missing, in words.
+    ``remarks`` say everything that was assumed, chosen, skipped or missing, in words; ``caveats``
+    what scores must be read with.
     """
 
     name: str
@@ -83,5 +84,6 @@ class DatasetScene:
     license: str
     attribution: str
     remarks: tuple[str, ...] = ()
+    caveats: tuple[str, ...] = ()
     source_begins_at: int = 0  # the first number of the recording that the clip was cut out of
     working_fps: float | None = None  # to learn from; by default the paper's 12

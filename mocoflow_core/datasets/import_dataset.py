@@ -67,7 +67,11 @@ def import_dataset(
     scene = kind.read(source, configuration)
     findings = check_dataset(scene)
     imported = ImportedDataset(
-        scene.name, scene.train_camera, scene.remarks, findings.measured, findings.warnings
+        scene.name,
+        scene.train_camera,
+        (*scene.remarks, *scene.caveats),
+        findings.measured,
+        findings.warnings,
     )
     record = {
         "kind": kind.name,

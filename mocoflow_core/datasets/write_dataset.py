@@ -154,6 +154,7 @@ def _describe(scene: DatasetScene, cameras: dict[str, CameraDescription]) -> Sce
         truth=TruthDescription(file="truth.npz") if truth else None,
         license=scene.license,
         attribution=scene.attribution,
+        remarks=list(scene.caveats),
     )
 
 

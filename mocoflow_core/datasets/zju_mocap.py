@@ -10,6 +10,7 @@ from pydantic import Field
 
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.camera_up import up_of_cameras
+from mocoflow_core.datasets.caveats import of_multi_view_bodies
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
 from mocoflow_core.datasets.zju_annotations import LengthUnit, ZjuAnnotations, read_annotations
 from mocoflow_core.datasets.zju_bodies import BodyChoice, BodySource, read_bodies
@@ -100,6 +101,7 @@ def read_zju_mocap(
             *(rate_remark, *clip_remarks, *body_remarks, *trim_remarks, *camera_remarks),
             *up_remarks,
         ),
+        caveats=of_multi_view_bodies(meshes),
         source_begins_at=int(pictures[0]),
         working_fps=configuration.fps / configuration.stride,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,6 +97,21 @@ def test_other_cameras_evaluate_the_frames_that_are_learned_from(which, working,
     assert len(views) == 2
     for view in views:
         assert view.frame_indices[:3].tolist() == working
+
+
+def test_bodies_that_saw_the_evaluation_cameras_are_said_to_have(zju, aist):
+    _, _, scene = zju
+    [remark] = scene.description.remarks
+    assert "fitted to the evaluation cameras' pictures" in remark
+    assert remark in json.loads((scene.root / "import.json").read_text())["remarks"]
+    assert aist[2].description.remarks == []
+
+
+def test_a_remark_changes_nothing_that_is_learned_from(zju):
+    _, _, scene = zju
+    bare = replace(scene, description=scene.description.model_copy(update={"remarks": []}))
+    assert bare.training_description() == scene.training_description()
+    assert bare.evaluation_description() == scene.evaluation_description()
 
 
 @pytest.mark.parametrize("which", ["zju", "aist"])
