@@ -64,6 +64,8 @@ def tell(imported: ImportedDataset) -> None:
     typer.echo(f"  measured: {measured}", err=True)
     for warning in imported.warnings:
         typer.echo(f"  warning: {warning}", err=True)
+    if imported.elsewhere:
+        typer.echo(f"  {len(imported.elsewhere)} of evaluation cameras: import.json", err=True)
 
 
 def choices(

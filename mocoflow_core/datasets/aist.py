@@ -216,7 +216,7 @@ def _meshes(
 def _up(calibrated: dict[str, Camera], configuration: AistConfig) -> tuple[Up, tuple[str, ...]]:
     if configuration.up:
         return configuration.up, (f"up is {configuration.up}, as asked for",)
-    up, remark = up_of_cameras(calibrated.values(), EXPECTED_UP)
+    up, remark = up_of_cameras((camera.R for camera in calibrated.values()), EXPECTED_UP)
     return up, (remark,)
 
 

@@ -36,13 +36,27 @@ HOPELESS_OVERLAP = 0.1
 
 @dataclass(frozen=True)
 class DatasetFindings:
-    """Measured values by name, and what is unusual among them."""
+    """Measured values by name, and what is unusual among them.
+
+    What evaluation cameras show stands apart: choices must not be made by it.
+    """
 
     measured: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # of the scene and the train camera
+    elsewhere: tuple[str, ...] = ()  # of the evaluation cameras
 
     def __add__(self, other: DatasetFindings) -> DatasetFindings:
-        return DatasetFindings({**self.measured, **other.measured}, self.warnings + other.warnings)
+        return DatasetFindings(
+            {**self.measured, **other.measured},
+            self.warnings + other.warnings,
+            self.elsewhere + other.elsewhere,
+        )
+
+    def of(self, camera: str, train_camera: str) -> DatasetFindings:
+        """The same, its warnings those of a camera."""
+        if camera == train_camera:
+            return self
+        return DatasetFindings(self.measured, elsewhere=self.warnings + self.elsewhere)
 
 
 def check_dataset(scene: DatasetScene) -> DatasetFindings:
@@ -59,15 +73,16 @@ def check_dataset(scene: DatasetScene) -> DatasetFindings:
         raise InputError(f"frames of {scene.train_camera}", "none", "Check the chosen clip.")
     require_contiguous(train.frames.indices, f"frames of {scene.train_camera}")
     findings = _check_counts(scene, train)
-    for camera in scene.cameras.values():
-        findings += _check_camera(camera)
+    for name, camera in scene.cameras.items():
+        findings += _check_camera(camera).of(name, scene.train_camera)
     sampled = {
         name: sample_masks(camera.camera, camera.masks, camera.frames.indices)
         for name, camera in scene.cameras.items()
         if camera.masks is not None
     }
     for name, masks in sampled.items():
-        findings += _check_foreground(name, masks, required=name == scene.train_camera)
+        found = _check_foreground(name, masks, required=name == scene.train_camera)
+        findings += found.of(name, scene.train_camera)
     return findings + _check_body(scene, sampled) if scene.meshes else findings
 
 
@@ -129,10 +144,11 @@ def _check_body(scene: DatasetScene, sampled: dict[str, SampledMasks]) -> Datase
     for name, recorded in scene.cameras.items():
         require_in_front(world, recorded.camera)
         distance, far = check_distance(world, recorded.camera)
-        findings += DatasetFindings({f"distance_m of {name}": distance}, far)
+        found = DatasetFindings({f"distance_m of {name}": distance}, far)
         if name in sampled and len(sampled[name].numbers):
             required = name == scene.train_camera
-            findings += _check_overlap(name, sampled[name], world, required)
+            found += _check_overlap(name, sampled[name], world, required)
+        findings += found.of(name, scene.train_camera)
     return findings
 
 

@@ -20,13 +20,17 @@ ALGORITHM_VERSION = 2  # scene.json says that numbers are the source's.
 
 @dataclass(frozen=True)
 class ImportedDataset:
-    """What was assumed, measured and found unusual, in words and numbers."""
+    """What was assumed, measured and found unusual, in words and numbers.
+
+    ``warnings`` are of the scene and its train camera, ``elsewhere`` of the evaluation cameras.
+    """
 
     name: str
     train_camera: str
     remarks: tuple[str, ...]
     measured: dict[str, float]
     warnings: tuple[str, ...]
+    elsewhere: tuple[str, ...]
 
     @property
     def of_train_camera(self) -> dict[str, float]:
@@ -72,6 +76,7 @@ def import_dataset(
         (*scene.remarks, *scene.caveats),
         findings.measured,
         findings.warnings,
+        findings.elsewhere,
     )
     record = {
         "kind": kind.name,
@@ -80,6 +85,7 @@ def import_dataset(
         "remarks": imported.remarks,
         "measured": imported.measured,
         "warnings": imported.warnings,
+        "warnings_of_evaluation_cameras": imported.elsewhere,
     }
     write_dataset(scene, out, record, progress)
     return imported

@@ -82,7 +82,7 @@ def read_zju_mocap(
     meshes, body_remarks = read_bodies(source, clip, _body_source(configuration))
     clip, trim_remarks = _with_bodies(clip, meshes)
     cameras, camera_remarks = _cameras(source, annotations, train, clip, configuration)
-    up, up_remarks = _up(cameras, configuration)
+    up, up_remarks = _up(annotations, configuration)
     rate_remark = (
         f"the true rate is not known: the source counts as {configuration.fps:g} per second, "
         f"one frame in {configuration.stride} is learned from"
@@ -168,9 +168,9 @@ def _cameras(
 
 
 def _up(
-    cameras: dict[str, DatasetCamera], configuration: ZjuMocapConfig
+    annotations: ZjuAnnotations, configuration: ZjuMocapConfig
 ) -> tuple[Up, tuple[str, ...]]:
     if configuration.up:
         return configuration.up, (f"up is {configuration.up}, as asked for",)
-    up, remark = up_of_cameras((part.camera for part in cameras.values()), EXPECTED_UP)
+    up, remark = up_of_cameras((one.R for one in annotations.calibrations.values()), EXPECTED_UP)
     return up, (remark,)

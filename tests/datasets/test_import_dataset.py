@@ -37,6 +37,7 @@ def test_what_was_assumed_and_measured_is_kept_beside_the_scene(tmp_path):
     assert record["configuration"] == {"stride": 3}
     assert record["remarks"] == ["capsules are assumed"]
     assert record["measured"] == imported.measured
+    assert record["warnings_of_evaluation_cameras"] == list(imported.elsewhere)
     assert "overlap at +0 of side" in imported.measured
     assert "overlap at +0 of side" not in imported.of_train_camera
     assert {"height_m", "overlap at +0 of front"} <= set(imported.of_train_camera)

@@ -138,3 +138,14 @@ def test_pictures_of_another_size_than_their_masks_are_refused(read):
     scene = read(change=shrink)
     with pytest.raises(InputError, match="64 x 96"):
         list(scene.cameras["Camera_B1"].masks.read([0]))
+
+
+def test_the_cameras_that_evaluate_have_no_say_in_what_is_up(read, tmp_path):
+    folder = tmp_path / "CoreView_377"
+    read()
+    chosen = {
+        read_zju_mocap(folder, ZjuMocapConfig(bodies="none", evaluation_cameras=others)).remarks[-1]
+        for others in ((), ("B2",), ("B7",), None)
+    }
+    [remark] = chosen
+    assert remark.startswith("up is -z")
