@@ -26,6 +26,7 @@ from mocoflow_core.datasets.aist_views import (
 from mocoflow_core.datasets.camera_up import up_of_cameras
 from mocoflow_core.datasets.caveats import of_masks_near, of_multi_view_bodies
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
+from mocoflow_core.datasets.links import require_inside
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.aist_motion import METRES, Motion, read_motion
 from mocoflow_core.geometry.camera import Camera
@@ -58,12 +59,15 @@ def read_aist(
     Frame numbers count the 60 Hz grid of the annotations. The videos are looked at for their
     plates; frames are read when written.
 
-    Raises InputError for names, cameras, videos, motions or body models that are wrong or missing.
+    Raises InputError for links that lead out of a folder, and for names, cameras, videos, motions
+    or body models that are wrong or missing.
     """
     files = find_files(
         source, configuration.sequence, configuration.videos, configuration.annotations
     )
     require_annotated(files.name)
+    require_inside(files.videos, files.recordings, configuration.links)
+    require_inside(files.annotations, files.annotated, configuration.links)
     ignored = _ignored(files, configuration)
     motion = read_motion(files.motion) if files.motion.is_file() else None
     unit_m, unit_remark = _unit(motion, configuration)

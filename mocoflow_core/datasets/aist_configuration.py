@@ -11,6 +11,7 @@ from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.aist_names import BAD_VIEWS
 from mocoflow_core.datasets.aist_time import Rounding
 from mocoflow_core.datasets.dataset_scene import Up
+from mocoflow_core.datasets.links import LINKS, Links
 
 Background = Literal["plate", "filmed"]
 
@@ -74,3 +75,4 @@ class AistConfig(ConfigurationPart):
         None, description="Male SMPL model file, or the folder it is in."
     )
     up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
+    links: Links = Field("inside", description=LINKS)

@@ -15,9 +15,7 @@ from mocoflow_core.errors import InputError
 LEAST_AGREEMENT = 0.7
 
 
-def up_of_cameras(
-    rotations: Iterable[NDArray[np.float64]], expected: Up
-) -> tuple[Up, str]:
+def up_of_cameras(rotations: Iterable[NDArray[np.float64]], expected: Up) -> tuple[Up, str]:
     """The world axis nearest to the mean up of the cameras, and a remark that says so.
 
     Args:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.dataset_checks import check_dataset
+from mocoflow_core.datasets.dataset_scene import DatasetScene
 from mocoflow_core.datasets.kinds import DatasetKind
 from mocoflow_core.datasets.write_dataset import require_new, write_dataset
 from mocoflow_core.errors import InputError
@@ -16,6 +17,16 @@ from mocoflow_core.settings import with_settings
 Progress = Callable[[float, str], None]
 # Counts up when the same files give another scene folder.
 ALGORITHM_VERSION = 2  # scene.json says that numbers are the source's.
+
+# Whatever values of another type, size or nesting than the data set's lead to.
+_OF_OTHER_CONTENT = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
 
 
 @dataclass(frozen=True)
@@ -68,7 +79,7 @@ def import_dataset(
     Raises InputError as the reader and the checks do, for a folder with content, and a full disk.
     """
     require_new(out)
-    scene = kind.read(source, configuration)
+    scene = _read(kind, source, configuration)
     findings = check_dataset(scene)
     imported = ImportedDataset(
         scene.name,
@@ -89,3 +100,18 @@ def import_dataset(
     }
     write_dataset(scene, out, record, progress)
     return imported
+
+
+def _read(kind: DatasetKind, source: Path, configuration: ConfigurationPart) -> DatasetScene:
+    """What the kind's reader makes of a folder, whatever lies in its files."""
+    try:
+        return kind.read(source, configuration)
+    except InputError:
+        raise
+    except _OF_OTHER_CONTENT as error:
+        words = f"{type(error).__name__}: {next(iter(str(error).splitlines()), '')[:100]}"
+        raise InputError(
+            f"files of {kind.name} as they were distributed",
+            f"others in {source} ({words})",
+            "Copy them again from the data set.",
+        ) from error

@@ -19,6 +19,7 @@ from mocoflow_core.datasets.dataset_scene import (
     DatasetScene,
 )
 from mocoflow_core.datasets.hdf5_masks import Hdf5Masks
+from mocoflow_core.datasets.links import LINKS, Links, require_inside
 from mocoflow_core.datasets.mask_sources import ChosenMasks, ErodedMasks
 from mocoflow_core.datasets.pose_alignment import PoseAlignment, align_poses
 from mocoflow_core.datasets.sampled_masks import sample_masks
@@ -85,6 +86,7 @@ class PeopleSnapshotConfig(ConfigurationPart):
     most_surplus: int = Field(
         1, ge=0, description="By how many frames, masks and poses may differ in number."
     )
+    links: Links = Field("inside", description=LINKS)
 
 
 def read_people_snapshot(
@@ -95,10 +97,13 @@ def read_people_snapshot(
 
     The video is decoded once to count its frames; masks and frames are read when written.
 
-    Raises InputError for missing or damaged files, sizes that disagree with ``camera.pkl``, counts
-    that differ by more than ``most_surplus``, and a missing body model.
+    Raises InputError for missing and damaged files, links that lead out of the folder, sizes that
+    disagree with ``camera.pkl``, counts that differ by more than ``most_surplus``, and a missing
+    body model.
     """
-    subject = _open(folder)
+    paths = find_paths(folder)
+    require_inside(folder, paths.present, configuration.links)
+    subject = _open(folder, paths)
     usable, remarks = _usable(subject, configuration.most_surplus)
     numbers, origin = choose_clip(
         subject.name, configuration.first_frame, configuration.frames, usable
@@ -140,8 +145,7 @@ class _Subject:
     remarks: tuple[str, ...]
 
 
-def _open(folder: Path) -> _Subject:
-    paths = find_paths(folder)
+def _open(folder: Path, paths: SnapshotPaths) -> _Subject:
     camera, remarks = _as_world(read_camera(paths.camera, CAMERA))
     video = decode_to_the_end(paths.video)
     _require_size(video.width, video.height, camera, paths.video.name)

@@ -56,6 +56,12 @@ class SnapshotPaths:
     consensus: Path | None
     keypoints: Path | None
 
+    @property
+    def present(self) -> list[Path]:
+        """All that there are."""
+        parts = (self.video, self.camera, self.masks, self.poses, self.consensus, self.keypoints)
+        return [part for part in parts if part]
+
 
 def find_paths(folder: Path) -> SnapshotPaths:
     """The files of a subject's folder. Raises InputError that names every missing one."""

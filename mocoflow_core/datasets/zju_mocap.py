@@ -12,6 +12,7 @@ from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.camera_up import up_of_cameras
 from mocoflow_core.datasets.caveats import of_multi_view_bodies
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
+from mocoflow_core.datasets.links import LINKS, Links, links_below, require_inside
 from mocoflow_core.datasets.zju_annotations import LengthUnit, ZjuAnnotations, read_annotations
 from mocoflow_core.datasets.zju_bodies import BodyChoice, BodySource, read_bodies
 from mocoflow_core.datasets.zju_cameras import (
@@ -58,12 +59,13 @@ class ZjuMocapConfig(ConfigurationPart):
         "union", description="Folder of masks: mask, mask_cihp, or what either calls a person."
     )
     background: Background = Field("white", description="What the frames show around the person.")
-    bodies: BodyChoice = Field("best", description="Folder of bodies; best: the first there is.")
+    bodies: BodyChoice = Field("best", description="Folder of bodies; best: of most frames.")
     body_number_offset: int = Field(0, description="Number of a body file less its picture's.")
     faces: Path | None = Field(None, description="Mesh file with the faces of SMPL.")
     body_model: Path | None = Field(None, description="SMPL model file, or the folder it is in.")
     camera_unit: LengthUnit = Field("millimetres", description="Unit of T in annots.npy.")
     up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
+    links: Links = Field("inside", description=LINKS)
 
 
 def read_zju_mocap(
@@ -72,8 +74,10 @@ def read_zju_mocap(
 ) -> DatasetScene:
     """One subject's folder (``CoreView_377``) as a scene. Pictures are read when written.
 
-    Raises InputError for another layout, and for missing calibrations, pictures, masks, bodies.
+    Raises InputError for links that lead out of the folder, another layout, and for missing
+    calibrations, pictures, masks, bodies.
     """
+    require_inside(source, links_below(source), configuration.links)
     annotations = read_annotations(source, configuration.camera_unit)
     train = choose_camera(annotations, configuration.train_camera)
     subject = subject_of([source.resolve().name, *annotations.pictures[train].values()])
@@ -167,9 +171,7 @@ def _cameras(
     return cameras, tuple(remarks)
 
 
-def _up(
-    annotations: ZjuAnnotations, configuration: ZjuMocapConfig
-) -> tuple[Up, tuple[str, ...]]:
+def _up(annotations: ZjuAnnotations, configuration: ZjuMocapConfig) -> tuple[Up, tuple[str, ...]]:
     if configuration.up:
         return configuration.up, (f"up is {configuration.up}, as asked for",)
     up, remark = up_of_cameras((one.R for one in annotations.calibrations.values()), EXPECTED_UP)
