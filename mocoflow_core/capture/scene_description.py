@@ -10,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mocoflow_core.errors import InputError
 
+BehindPerson = Literal["kept", "plate", "white"]
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -70,6 +72,9 @@ class SceneDescription(_Part):
     world: WorldDescription
     train_camera: str
     cameras: dict[str, CameraDescription]
+    behind_person: BehindPerson = Field(
+        "kept", description="What capture.behind_person is where it says nothing."
+    )
     meshes: MeshesDescription | None = None
     truth: TruthDescription | None = None
     license: str = ""

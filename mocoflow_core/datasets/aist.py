@@ -95,6 +95,7 @@ def read_aist(
         license=LICENSE,
         attribution=ATTRIBUTION,
         remarks=(*remarks, *body_remarks, *truth_remarks, *up_remarks, *_floor(meshes, up)),
+        behind_person="plate" if configuration.background == "plate" else "kept",
         caveats=(
             *of_multi_view_bodies(meshes),
             *(() if configuration.masks else of_masks_near(meshes)),
@@ -174,7 +175,6 @@ def _view_choice(meshes: DatasetMeshes | None, configuration: AistConfig) -> Vie
     return ViewChoice(
         configuration.rounding,
         configuration.masks,
-        configuration.background,
         PlateChoice(configuration.plate_frames, configuration.difference_threshold),
         meshes.sequence if meshes else None,
     )

@@ -13,8 +13,6 @@ from mocoflow_core.datasets.aist_time import Rounding
 from mocoflow_core.datasets.dataset_scene import Up
 from mocoflow_core.datasets.links import LINKS, Links
 
-Background = Literal["plate", "filmed"]
-
 
 class AistConfig(ConfigurationPart):
     """What is taken of an AIST sequence; the defaults are the protocol of MoCo-Flow sec. 4."""
@@ -59,8 +57,10 @@ class AistConfig(ConfigurationPart):
     masks: Path | None = Field(
         None, description="Folder with <video name>/000000.png; null: what differs from the plate."
     )
-    background: Background = Field(
-        "plate", description="Around the person: the clip's median (no shadows), or as filmed."
+    background: Literal["plate", "filmed"] = Field(
+        "plate",
+        description="Plate: a reconstruction sets the person before the clip's median, without "
+        "moving shadows; the scene's frames are as filmed.",
     )
     plate_frames: int = Field(
         48, ge=1, description="Frames that make the median, of those learned from."

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from mocoflow_core.capture.frame_source import VideoFrames
 from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.datasets.chosen_frames import WHITE, ChosenFrames, FramesOnWhite
+from mocoflow_core.datasets.chosen import Chosen
 from mocoflow_core.datasets.dataset_scene import (
     DatasetCamera,
     DatasetMeshes,
@@ -20,7 +20,7 @@ from mocoflow_core.datasets.dataset_scene import (
 )
 from mocoflow_core.datasets.hdf5_masks import Hdf5Masks
 from mocoflow_core.datasets.links import LINKS, Links, require_inside
-from mocoflow_core.datasets.mask_sources import ChosenMasks, ErodedMasks
+from mocoflow_core.datasets.mask_sources import ErodedMasks
 from mocoflow_core.datasets.pose_alignment import PoseAlignment, align_poses
 from mocoflow_core.datasets.sampled_masks import sample_masks
 from mocoflow_core.datasets.snapshot_bodies import BodyShape, SnapshotGender, open_bodies
@@ -65,7 +65,9 @@ class PeopleSnapshotConfig(ConfigurationPart):
         2, ge=1, description="Every n-th frame is learned from: 24 to 12 per second in the paper."
     )
     background: Literal["white", "filmed"] = Field(
-        "white", description="White: pixels outside the masks are, as in the paper."
+        "white",
+        description="White: what a reconstruction sets the person before, as in the paper; the "
+        "scene's frames are as filmed.",
     )
     mask_erosion_px: int = Field(
         0, ge=0, le=64, description="Side of the square that masks shrink by; Neural Body: 4."
@@ -128,6 +130,7 @@ def read_people_snapshot(
         license=LICENSE,
         attribution=ATTRIBUTION,
         remarks=(*remarks, rate),
+        behind_person="white" if configuration.background == "white" else "kept",
         working_fps=working_fps,
     )
 
@@ -237,9 +240,6 @@ def _recorded(
     subject: _Subject, numbers: Indices, configuration: PeopleSnapshotConfig
 ) -> DatasetCamera:
     camera, side_px = subject.camera, configuration.mask_erosion_px
-    masks = ChosenMasks(ErodedMasks(subject.masks, side_px) if side_px else subject.masks, numbers)
-    frames = ChosenFrames(VideoFrames(subject.paths.video), numbers)
-    if configuration.background == "filmed":
-        return DatasetCamera(camera, frames, masks)
-    plate = np.full((camera.height, camera.width, 3), WHITE, np.uint8)
-    return DatasetCamera(camera, FramesOnWhite(frames, masks), masks, plate)
+    masks = ErodedMasks(subject.masks, side_px) if side_px else subject.masks
+    video = VideoFrames(subject.paths.video)
+    return DatasetCamera(camera, Chosen(video, numbers, fps=video.fps), Chosen(masks, numbers))

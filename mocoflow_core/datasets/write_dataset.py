@@ -139,6 +139,7 @@ def _describe(scene: DatasetScene, cameras: dict[str, CameraDescription]) -> Sce
         name=scene.name,
         fps=scene.fps,
         **rate,
+        behind_person=scene.behind_person,
         source_begins_at=scene.source_begins_at,
         world=WorldDescription(unit="m", up=scene.up),
         train_camera=scene.train_camera,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,6 @@ from mocoflow_core.datasets.links import LINKS, Links, links_below, require_insi
 from mocoflow_core.datasets.zju_annotations import LengthUnit, ZjuAnnotations, read_annotations
 from mocoflow_core.datasets.zju_bodies import BodyChoice, BodySource, read_bodies
 from mocoflow_core.datasets.zju_cameras import (
-    Background,
     choose_camera,
     open_camera,
     recorded_frames,
@@ -58,7 +58,11 @@ class ZjuMocapConfig(ConfigurationPart):
     masks: MaskChoice = Field(
         "union", description="Folder of masks: mask, mask_cihp, or what either calls a person."
     )
-    background: Background = Field("white", description="What the frames show around the person.")
+    background: Literal["white", "filmed"] = Field(
+        "white",
+        description="White: what a reconstruction sets the person before; the scene's frames are "
+        "as filmed.",
+    )
     bodies: BodyChoice = Field("best", description="Folder of bodies; best: of most frames.")
     body_number_offset: int = Field(0, description="Number of a body file less its picture's.")
     faces: Path | None = Field(None, description="Mesh file with the faces of SMPL.")
@@ -105,6 +109,7 @@ def read_zju_mocap(
             *(rate_remark, *clip_remarks, *body_remarks, *trim_remarks, *camera_remarks),
             *up_remarks,
         ),
+        behind_person="white" if configuration.background == "white" else "kept",
         caveats=of_multi_view_bodies(meshes),
         source_begins_at=int(pictures[0]),
         working_fps=configuration.fps / configuration.stride,
@@ -163,7 +168,6 @@ def _cameras(
             name,
             clip[::every].tolist(),
             configuration.masks,
-            configuration.background,
         )
         remarks += said
         if camera:

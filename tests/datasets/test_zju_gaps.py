@@ -73,7 +73,7 @@ def test_a_train_frame_without_any_mask_cuts_the_clip(read):
 
 def test_evaluation_frames_without_a_mask_are_skipped(read):
     scene = read(without=["mask*/Camera_B2/000002.png", "Camera_B3/000004.jpg"])
-    assert scene.cameras["Camera_B2"].frames.indices.tolist() == [0, 4]
+    assert scene.cameras["Camera_B2"].masks.indices.tolist() == [0, 4]
     assert scene.cameras["Camera_B3"].frames.indices.tolist() == [0, 2]
     assert said(scene, "1 of 3 masks of Camera_B2 are missing")
     assert said(scene, "1 of 3 pictures of Camera_B3 are missing")
