@@ -26,7 +26,8 @@ from mocoflow_core.capture.checks import check_lens, check_share
 from mocoflow_core.capture.frame_selection import require_contiguous
 from mocoflow_core.capture.scene import UP_VECTORS
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene
-from mocoflow_core.datasets.sampled_masks import SampledMasks, require_size, sample_masks
+from mocoflow_core.datasets.picture_size import require_size
+from mocoflow_core.datasets.sampled_masks import SampledMasks, sample_masks
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
@@ -111,7 +112,7 @@ def _check_camera(recorded: DatasetCamera) -> DatasetFindings:
     camera, first = recorded.camera, recorded.frames.indices[:1].tolist()
     require_calibration(camera, "the data set's calibration")
     for number, image in recorded.frames.read(first):
-        require_size(image, camera, f"frame {number} of {camera.name}")
+        require_size(image.shape[1::-1], camera.size, f"frame {number} of {camera.name}")
     return DatasetFindings(warnings=check_lens(camera))
 
 

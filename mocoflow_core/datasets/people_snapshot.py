@@ -21,6 +21,7 @@ from mocoflow_core.datasets.dataset_scene import (
 from mocoflow_core.datasets.hdf5_masks import Hdf5Masks
 from mocoflow_core.datasets.links import LINKS, Links, require_inside
 from mocoflow_core.datasets.mask_sources import ErodedMasks
+from mocoflow_core.datasets.picture_size import require_size
 from mocoflow_core.datasets.pose_alignment import PoseAlignment, align_poses
 from mocoflow_core.datasets.sampled_masks import sample_masks
 from mocoflow_core.datasets.snapshot_bodies import BodyShape, SnapshotGender, open_bodies
@@ -151,9 +152,9 @@ class _Subject:
 def _open(folder: Path, paths: SnapshotPaths) -> _Subject:
     camera, remarks = _as_world(read_camera(paths.camera, CAMERA))
     video = decode_to_the_end(paths.video)
-    _require_size(video.width, video.height, camera, paths.video.name)
+    require_size((video.width, video.height), camera.size, paths.video.name)
     masks = Hdf5Masks(paths.masks)
-    _require_size(masks.shape[2], masks.shape[1], camera, paths.masks.name)
+    require_size(masks.shape[:0:-1], camera.size, paths.masks.name)
     tracked = read_tracked_body(paths.poses)
     name = folder.resolve().name
     return _Subject(name, paths, camera, video.frame_count, masks, tracked, remarks)
@@ -164,16 +165,6 @@ def _as_world(camera: Camera) -> tuple[Camera, tuple[str, ...]]:
     apart = max(float(np.abs(camera.R - np.eye(3)).max()), float(np.abs(camera.t).max()))
     moved = ("camera_rt and camera_t are set to 0: poses have them",) if apart > NO_MOTION else ()
     return replace(camera, R=np.eye(3), t=np.zeros(3)), moved
-
-
-def _require_size(width: int, height: int, camera: Camera, what: str) -> None:
-    if (width, height) != (camera.width, camera.height):
-        raise InputError(
-            f"{what} must be {camera.width} x {camera.height} as camera.pkl says",
-            f"{width} x {height}",
-            "It was turned, cropped or resized since: undo that, for example with ffmpeg's "
-            "filters transpose and crop.",
-        )
 
 
 def _usable(subject: _Subject, most_surplus: int) -> tuple[int, list[str]]:

@@ -171,7 +171,7 @@ def test_a_video_that_was_turned_is_refused(write, recording):
     wide = np.concatenate([recording.frames, recording.frames[:, :, :48]], axis=2)
     write_lossless(folder / f"{folder.name}.mp4", wide)
     told = refusal(folder)
-    assert "must be 96 x 96 as camera.pkl says, got 144 x 96" in told
+    assert "must be 96 x 96 as the calibration says, got 144 x 96" in told
     assert "turned" in told
 
 
