@@ -8,10 +8,11 @@ import sys
 import pytest
 
 from flows.command_line import main
-from flows.imported_scene import import_key, scene_folder, tell
+from flows.imported_scene import scene_folder, tell
 from flows.request import Request
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.datasets.detect import detect_kind
+from mocoflow_core.datasets.import_cache import import_key
 from mocoflow_core.datasets.import_dataset import ImportedDataset, configure
 from mocoflow_core.errors import InputError
 from tests.datasets.snapshot_layout import turning, write_snapshot
