@@ -24,6 +24,7 @@ from mocoflow_core.video.lens import camera_of_video
 from mocoflow_core.video.person_masks import PackedMasks, make_plate, mask_person
 
 CAMERA = "camera"
+CAUTION = "caution: "
 # People hold cameras upright; the world is the camera's axes.
 UP: Up = "-y"
 # The camera and movement are checked on so many frames.
@@ -70,6 +71,14 @@ def read_bare_video(
         fitted = _fit(person, masks, camera, frames, configuration, progress)
         meshes = DatasetMeshes(fitted.meshes, "world", True, "fitted to landmarks and outlines")
         fit_said = _about(fitted)
+    said = (
+        rate_said,
+        *person.remarks,
+        *_cut_off(person, frames),
+        motion_said,
+        lens_said,
+        *fit_said,
+    )
     return DatasetScene(
         name=path.stem,
         fps=frames.rate,
@@ -80,10 +89,8 @@ def read_bare_video(
         truth=None,
         license=LICENSE,
         attribution=path.name,
-        remarks=(
-            *(rate_said, *person.remarks, *_cut_off(person, frames)),
-            *(motion_said, lens_said, *fit_said),
-        ),
+        remarks=tuple(line for line in said if not line.startswith(CAUTION)),
+        caveats=tuple(line for line in said if line.startswith(CAUTION)),
         working_fps=_working_fps(frames.rate, configuration.working_fps),
     )
 
