@@ -76,7 +76,7 @@ def read_rows(
             if described is None:
                 raise damaged(f"no row {row} in {name!r}")
             # One row at a time is in memory: it is not counted against the whole file.
-            yield _content(answers, described[1], Allowance(allowance.limits))
+            yield _content(answers, described[1], Allowance(allowance.limits, allowance.file_bytes))
 
 
 @contextmanager
@@ -87,7 +87,7 @@ def _answers(
         "path": str(path.absolute()),
         "name": name,
         "rows": None if rows is None else [int(row) for row in rows],
-        "bytes": allowance.limits.made_bytes if content else 0,
+        "bytes": allowance.left_bytes if content else 0,
         "seconds": allowance.limits.seconds,
         "members": allowance.limits.members,
     }
