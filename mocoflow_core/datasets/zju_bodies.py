@@ -10,13 +10,13 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.body.mesh_file import read_mesh
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.smpl_file import read_smpl_model
 from mocoflow_core.datasets.body_model_file import WHERE_TO_GET_IT, find_body_model
 from mocoflow_core.datasets.dataset_scene import DatasetMeshes
 from mocoflow_core.datasets.zju_parameters import posed_bodies, read_parameters, stored_vertices
 from mocoflow_core.errors import InputError
-from mocoflow_core.estimators.mesh_file import read_mesh
 
 BodyKind = Literal["new_vertices", "new_params", "vertices", "params"]
 BodyChoice = Literal["best", "new_vertices", "new_params", "vertices", "params", "none"]

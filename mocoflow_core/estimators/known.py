@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.io.untrusted import read_npz
 
 # What tools' bodies are made of: joints of the model, and where users get it.
 MODELS = {"SMPL": (24, SMPL_URL), "SMPL-X": (55, SMPLX_URL)}
@@ -57,7 +55,7 @@ class Known:
         From the file named for it or the body model. Raises InputError where neither fits.
         """
         if self.chosen.faces:
-            return _faces_of(self.chosen.faces, vertices)
+            return read_faces(self.chosen.faces, vertices)
         if self.chosen.body_model:
             return read_faces(self.chosen.body_model, vertices)
         raise InputError(
@@ -66,19 +64,3 @@ class Known:
             f"Give the SMPL model file (.pkl or .npz, from {SMPL_URL}) with --body-model, or any "
             "mesh of this topology (OBJ, PLY, GLB, meshes.npz) with --set meshes.faces=FILE.",
         )
-
-
-def _faces_of(path: Path, vertices: int) -> NDArray[np.int32]:
-    """Faces of a mesh, a body model, or a mesh file of our own."""
-    if path.suffix == ".npz":
-        arrays = read_npz(path)
-        bodies, faces = arrays.get("vertices"), arrays.get("faces")
-        if isinstance(bodies, np.ndarray) and isinstance(faces, np.ndarray):
-            if bodies.ndim == 3 and bodies.shape[1] == vertices:
-                return faces.astype(np.int32)
-            raise InputError(
-                f"{path} must hold bodies of {vertices} vertices",
-                f"{bodies.shape}",
-                "Give meshes of the same kind as the estimate's bodies.",
-            )
-    return read_faces(path, vertices)

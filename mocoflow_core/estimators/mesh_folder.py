@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from mocoflow_core.body.mesh_file import MESH_SUFFIXES, read_mesh
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.mesh_file import MESH_SUFFIXES, read_mesh
 from mocoflow_core.estimators.stored import Stored, frame_numbers
 
 TOOL = "meshes"

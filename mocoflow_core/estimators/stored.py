@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from mocoflow_core.body.mesh_file import MESH_SUFFIXES
 from mocoflow_core.errors import InputError
-from mocoflow_core.estimators.mesh_file import MESH_SUFFIXES
 from mocoflow_core.io.untrusted import read_untrusted
 
 FOLDER_SUFFIXES = (".npy", ".npz", ".json", *MESH_SUFFIXES)
