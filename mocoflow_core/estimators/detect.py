@@ -9,17 +9,12 @@ from mocoflow_core.estimators.configuration import Kind
 from mocoflow_core.estimators.readers import READERS
 from mocoflow_core.estimators.stored import Stored, what_is_in
 
-NATIVE_SUFFIX = ".npz"
-
 
 def detect(stored: Stored) -> Kind:
     """The kind whose layout the content has.
 
     Raises InputError where it has none or several, with what was found and the kinds there are.
     """
-    if not stored.is_folder and stored.path.suffix == NATIVE_SUFFIX and _is_no_result(stored):
-        # Whatever is wrong with such a file, the native reader says it best.
-        return "native"
     found = [kind for kind, reader in READERS.items() if reader.recognises(stored)]
     if len(found) == 1:
         return found[0]
@@ -35,14 +30,6 @@ def detect(stored: Stored) -> Kind:
         f"{what_is_in(stored)} in {stored.path.name}{_advice(stored)}",
         "Give the file as the tool wrote it, or force its kind with --set meshes.kind=KIND.",
     )
-
-
-def _is_no_result(stored: Stored) -> bool:
-    try:
-        content = stored.content
-    except InputError:
-        return True
-    return not (isinstance(content, Mapping) and "results" in content)
 
 
 def _advice(stored: Stored) -> str:

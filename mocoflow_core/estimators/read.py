@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,24 +28,33 @@ def read_estimate(path: Path, known: Known) -> BodyEstimate:
     model that is needed and not given, and for settings that its kind does not read.
     """
     stored = Stored(path)
-    kind = detect(stored) if known.chosen.kind == "auto" else known.chosen.kind
+    with _as_written_by("one of the known tools", path):
+        kind = detect(stored) if known.chosen.kind == "auto" else known.chosen.kind
     _require_read(known.chosen, kind)
-    try:
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            estimate = READERS[kind].read(stored, known)
-    except InputError:
-        raise
-    # Whatever arrays of another size, type or nesting than the tool's lead to.
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise InputError(
-            f"an estimate as {READERS[kind].title} writes it",
-            f"other arrays in {path.name} ({type(error).__name__}: {str(error).splitlines()[:1]})",
-            "Write the estimate again.",
-        ) from error
+    with (
+        _as_written_by(READERS[kind].title, path),
+        np.errstate(divide="ignore", invalid="ignore", over="ignore"),
+    ):
+        estimate = READERS[kind].read(stored, known)
     if not known.chosen.first_frame:
         return estimate
     later = (estimate.frame_indices + known.chosen.first_frame).astype(np.int32)
     return replace(estimate, frame_indices=later)
+
+
+@contextmanager
+def _as_written_by(tool: str, path: Path) -> Iterator[None]:
+    """Arrays of another size, type or nesting than the tool's: bad input, whatever they cause."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"an estimate as {tool} writes it",
+            f"other arrays in {path.name} ({type(error).__name__}: {str(error).splitlines()[:1]})",
+            "Write the estimate again.",
+        ) from error
 
 
 def _require_read(chosen: EstimateConfig, kind: Kind) -> None:
