@@ -19,9 +19,9 @@ demo: install
 test: install
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-# A server, a worker, deployed runs: some minutes.
+# Whole processes: killed ranks and runs, a server with a worker. Some minutes.
 e2e: install
-	$(BIN)/python -m pytest -m e2e tests/e2e
+	$(BIN)/python -m pytest -m e2e
 
 stability: install
 	$(BIN)/mocoflow stability --out stability

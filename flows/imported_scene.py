@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from shutil import rmtree
-from tempfile import mkdtemp
 from typing import TYPE_CHECKING
 
 import typer
 
 from flows.user_folders import body_models_folder, cache_folder
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.content_key import digest_document
-from mocoflow_core.io.full_disk import full_disk_is_bad_input
 
 if TYPE_CHECKING:
     from mocoflow_core.configuration import ConfigurationPart
@@ -36,19 +32,20 @@ def scene_folder(path: Path, without_bodies: bool, body_model: Path | None = Non
     if path.suffix == ".json" or not path.is_dir() or (path / "scene.json").is_file():
         return path
     from mocoflow_core.datasets.detect import detect_kind
+    from mocoflow_core.datasets.import_cache import import_once, place_of_import
+    from tasks.terminal_bar import terminal_bar
 
     kind = detect_kind(path)
     configuration = _defaults(kind, without_bodies, body_model)
-    folder = (
-        cache_folder() / "datasets" / f"{path.resolve().name}-{import_key(path, configuration)}"
-    )
+    folder = place_of_import(path, configuration, cache_folder() / "datasets")
     if folder.is_dir():
         typer.echo(f"{path} is {kind.name}, imported before: {folder}", err=True)
         return folder
     typer.echo(f"{path} is {kind.name}: imported into {folder}", err=True)
     try:
-        with full_disk_is_bad_input(f"The folder {folder.parent}"):
-            tell(_import(kind, path, configuration, folder))
+        with terminal_bar(f"import {path.name}") as progress:
+            imported = import_once(kind, path, configuration, folder, progress)
+        tell(imported)
     except InputError as error:
         command = f"mocoflow import {kind.name} {path} --set FIELD=VALUE --out DIR"
         action = f"{error.action} Every choice: {command}."
@@ -64,6 +61,8 @@ def tell(imported: ImportedDataset) -> None:
     typer.echo(f"  measured: {measured}", err=True)
     for warning in imported.warnings:
         typer.echo(f"  warning: {warning}", err=True)
+    if imported.elsewhere:
+        typer.echo(f"  {len(imported.elsewhere)} of evaluation cameras: import.json", err=True)
 
 
 def choices(
@@ -86,48 +85,3 @@ def _defaults(
     if without_bodies and "bodies" in kind.configuration.model_fields:
         return configure(kind, ("bodies=none",), None)
     return choices(kind, (), body_model)
-
-
-def _import(
-    kind: DatasetKind, source: Path, configuration: ConfigurationPart, folder: Path
-) -> ImportedDataset:
-    """Two processes may import the same at once: the first to be done gives the folder."""
-    from mocoflow_core.datasets.import_dataset import import_dataset
-    from tasks.terminal_bar import terminal_bar
-
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
-        with terminal_bar(f"import {source.name}") as progress:
-            imported = import_dataset(kind, source, configuration, beside / "scene", progress)
-        if not folder.is_dir():
-            (beside / "scene").rename(folder)
-    finally:
-        rmtree(beside, ignore_errors=True)
-    return imported
-
-
-def import_key(source: Path, configuration: ConfigurationPart) -> str:
-    """What an import depends on: the files of the data set and of body models, and the choices."""
-    from mocoflow_core.datasets.import_dataset import ALGORITHM_VERSION
-
-    given = getattr(configuration, "body_model", None)
-    document = {
-        "version": ALGORITHM_VERSION,
-        "configuration": configuration.model_dump(mode="json"),
-        "files": _stamps(source),
-        "body_models": _stamps(given) if given else [],
-    }
-    return digest_document(document)[:12]
-
-
-def _stamps(folder: Path) -> list[list[object]]:
-    """Name, size and time of every file: gigabytes of pictures are not read for their digest."""
-    stamps: list[list[object]] = []
-    for file in sorted(folder.rglob("*")) if folder.is_dir() else [folder]:
-        if file.is_file():
-            status = file.stat()
-            stamps.append(
-                [str(file.relative_to(folder.parent)), status.st_size, status.st_mtime_ns]
-            )
-    return stamps

@@ -128,6 +128,7 @@ class Request(BaseModel):
             store=self.store.url,
             license=self.scene.description.license,
             attribution=self.scene.description.attribution,
+            remarks=tuple(self.scene.description.remarks),
         )
         return RunFolder.claim(out, begun)
 

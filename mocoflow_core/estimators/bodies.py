@@ -50,7 +50,7 @@ def modelled(
     Raises InputError without the model.
     """
     model = known.require_model(tool, "SMPL")
-    shape, remarks = shapes_of(_fitting(betas, model), known)
+    shape, remarks = shapes_of(fitting_shapes(betas, model), known)
     vertices = posed_vertices(model, pose, shape, translation)
     return Bodies(vertices.astype(np.float32), model.faces.astype(np.int32), remarks)
 
@@ -71,7 +71,7 @@ def stored(
     if not whole or model is None:
         note = "body shapes vary as the estimate's do: one shape for all needs --body-model"
         return Bodies(own.vertices, faces, (note,) if np.ptp(betas, axis=0).any() else ())
-    betas = _fitting(betas, model)
+    betas = fitting_shapes(betas, model)
     off_m = _difference_m(model, vertices, pose, betas)
     if off_m > SAME_BODY_M:
         note = (
@@ -95,8 +95,8 @@ def _difference_m(model: SmplModel, vertices: Array, pose: Array, betas: Array) 
     return float(np.linalg.norm(apart, axis=-1).max())
 
 
-def _fitting(betas: Array, model: SmplModel) -> Array:
-    """The coefficients that the model has directions for."""
+def fitting_shapes(betas: Array, model: SmplModel) -> Array:
+    """The coefficients; raises InputError where the model has no directions for some."""
     known = model.shape_directions.shape[-1]
     if betas.shape[-1] > known:
         raise InputError(

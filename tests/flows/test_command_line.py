@@ -21,7 +21,7 @@ from tests.flows.stages import STAGES
 ROOT = Path(__file__).parents[2]
 
 
-def mocoflow(*arguments, timeout=120):
+def mocoflow(*arguments, timeout=300):
     return subprocess.run(
         [sys.executable, "-c", "from flows.command_line import main; main()", *map(str, arguments)],
         cwd=ROOT,
@@ -193,14 +193,6 @@ def refuse_inside_the_flow(reconstruct, tmp_path):
     return run
 
 
-def without_masks_and_background(scene, describe):
-    def edit(description):
-        for part in ("masks", "background"):
-            description["cameras"]["cam00"].pop(part, None)
-
-    describe(edit)
-
-
 def with_a_mask_of_another_size(scene, describe):
     Image.new("L", (16, 16), 255).save(scene / "masks" / "cam00" / "000002.png")
 
@@ -240,7 +232,6 @@ def with_meshes_in_millimetres(scene, describe):
 @pytest.mark.parametrize(
     ("damage", "because"),
     [
-        (without_masks_and_background, "masks or a background"),
         (with_a_mask_of_another_size, r"mask 000002\.png of cam00 .* got 16 x 16"),
         (with_a_missing_frame, "no frame 3 .1 missing"),
         (with_a_video_that_cannot_be_decoded, r"broken\.mp4 must be a video"),

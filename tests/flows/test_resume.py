@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from mocoflow_core.artifacts import SceneArtifact
 from mocoflow_core.io.content_key import digest_file
 from mocoflow_core.io.store import Store
@@ -28,7 +30,7 @@ def started(scene, store, out):
 
 
 def kill_after_the_first_checkpoint(process, store):
-    for _ in range(6000):
+    for _ in range(30_000):
         if list(store.glob("optimise_scene/*.partial/checkpoint.safetensors")):
             break
         assert process.poll() is None
@@ -37,6 +39,7 @@ def kill_after_the_first_checkpoint(process, store):
     process.wait()
 
 
+@pytest.mark.e2e
 def test_a_run_killed_in_the_optimisation_ends_in_the_same_parameters(
     reconstruct, toy_scene, tmp_path
 ):

@@ -110,6 +110,7 @@ def test_one_device_takes_no_other_process_and_ends_as_ever(job, alone, tmp_path
     assert watcher.lines == []
 
 
+@pytest.mark.e2e
 def test_a_killed_rank_starts_again_from_the_last_checkpoint_and_nothing_is_lost(
     job, alone, two_ranks, toy_folder, tmp_path
 ):
@@ -138,6 +139,7 @@ def test_a_killed_rank_starts_again_from_the_last_checkpoint_and_nothing_is_lost
     }
 
 
+@pytest.mark.e2e
 def test_a_rank_that_dies_again_ends_the_run_in_words_and_overwrites_nothing(
     prepared, job, tmp_path
 ):
@@ -181,6 +183,7 @@ optimise_on(Devices(here=2), read_job(job), folder, tell, ignore, ignore, ignore
 """
 
 
+@pytest.mark.e2e
 @pytest.mark.parametrize(
     ("how", "training"),
     [(signal.SIGTERM, True), (signal.SIGINT, False), (signal.SIGKILL, False)],
