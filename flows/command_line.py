@@ -26,7 +26,7 @@ MESHES_HELP = (
     "TRAM, ROMP, BEV, AIST++ or EasyMocap, a folder of OBJ, PLY or GLB, or a meshes.npz."
 )
 PERSON_HELP = "Id of the person among those of --meshes; by default the longest track."
-BODY_MODEL_HELP = "SMPL or SMPL-X model file, where the meshes need one."
+BODY_MODEL_HELP = "SMPL or SMPL-X model file, or a folder of them, where the meshes need one."
 PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(

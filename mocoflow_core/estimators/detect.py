@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import Kind
+from mocoflow_core.estimators.estimate_file import EstimateFile, what_is_in
 from mocoflow_core.estimators.readers import READERS
-from mocoflow_core.estimators.stored import Stored, what_is_in
 
 
-def detect(stored: Stored) -> Kind:
+def detect(stored: EstimateFile) -> Kind:
     """The kind whose layout the content has.
 
     Raises InputError where it has none or several, with what was found and the kinds there are.
@@ -32,7 +32,7 @@ def detect(stored: Stored) -> Kind:
     )
 
 
-def _advice(stored: Stored) -> str:
+def _advice(stored: EstimateFile) -> str:
     """Files that are often taken for the right ones."""
     content = stored.content
     first = next(iter(content.values()), None) if isinstance(content, Mapping) else None

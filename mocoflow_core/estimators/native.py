@@ -8,23 +8,22 @@ from typing import get_args
 
 import numpy as np
 
-from mocoflow_core.body.ingest import FileCoordinates
-from mocoflow_core.capture.scene_description import MeshesDescription
+from mocoflow_core.capture.scene_description import Coordinates, MeshesDescription
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.stored import Stored
+from mocoflow_core.estimators.estimate_file import EstimateFile
 from mocoflow_core.estimators.tracks import Arrays
 
 PARTS = ("faces", "frame_indices", "vertices")
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """An archive with our arrays."""
     return isinstance(stored.content, Mapping) and set(stored.content) >= set(PARTS)
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """The arrays of a mesh file, ascending in time, and where they stand.
 
     A file may say its own ``coordinates`` and ``located``; the rest is taken from the scene.
@@ -44,7 +43,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
     order = np.argsort(arrays["frame_indices"], kind="stable")
     same_length = len(arrays["vertices"]) == len(order)
     regressor = arrays.get("keypoint_regressor")
-    description = _description(path, arrays, known.described)
+    description = _description(path, arrays, context.described)
     return BodyEstimate(
         source=description.source,
         frame_indices=arrays["frame_indices"].astype(np.int32)[order],
@@ -62,9 +61,9 @@ def _description(
 ) -> MeshesDescription:
     fallback = described or MeshesDescription(file=path.name, coordinates="camera", located=True)
     coordinates = str(arrays.get("coordinates", fallback.coordinates))
-    if coordinates not in get_args(FileCoordinates):
+    if coordinates not in get_args(Coordinates):
         raise InputError(
-            f"coordinates must be one of {', '.join(get_args(FileCoordinates))}",
+            f"coordinates must be one of {', '.join(get_args(Coordinates))}",
             f"{coordinates!r:.40}",
             f"Correct them in {path.name}.",
         )

@@ -11,35 +11,42 @@ import numpy as np
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig, Kind
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.detect import detect
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.estimate_file import EstimateFile
 from mocoflow_core.estimators.readers import READERS
-from mocoflow_core.estimators.stored import Stored
 
 # Read by all kinds, or by whoever has a use for them: files lie ready for several scenes.
 _ALWAYS = {"kind", "body_model", "faces"}
 
 
-def read_estimate(path: Path, known: Known) -> BodyEstimate:
+def read_estimate(path: Path, context: EstimateContext) -> BodyEstimate:
     """The bodies that a tool's file or folder holds, for one person.
 
     Raises InputError for unknown or damaged content, for a person who is not in it, for a body
     model that is needed and not given, and for settings that its kind does not read.
     """
-    stored = Stored(path)
-    with _as_written_by("one of the known tools", path):
-        kind = detect(stored) if known.chosen.kind == "auto" else known.chosen.kind
-    _require_read(known.chosen, kind)
+    stored = EstimateFile(path)
+    kind = kind_of(stored, context.chosen)
+    _require_read(context.chosen, kind)
     with (
         _as_written_by(READERS[kind].title, path),
         np.errstate(divide="ignore", invalid="ignore", over="ignore"),
     ):
-        estimate = READERS[kind].read(stored, known)
-    if not known.chosen.first_frame:
+        estimate = READERS[kind].read(stored, context)
+    if not context.chosen.first_frame:
         return estimate
-    later = (estimate.frame_indices + known.chosen.first_frame).astype(np.int32)
+    later = (estimate.frame_indices + context.chosen.first_frame).astype(np.int32)
     return replace(estimate, frame_indices=later)
+
+
+def kind_of(stored: EstimateFile, chosen: EstimateConfig) -> Kind:
+    """The kind that was chosen, else the one told by the content. Raises InputError as it does."""
+    if chosen.kind != "auto":
+        return chosen.kind
+    with _as_written_by("one of the known tools", stored.path):
+        return detect(stored)
 
 
 @contextmanager
