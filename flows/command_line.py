@@ -30,7 +30,7 @@ PERSON_HELP = (
     "Id of the person among those of --meshes, by default the longest track; of a bare video its "
     "number, by default the only large one."
 )
-BODY_MODEL_HELP = "SMPL or SMPL-X model file, where the meshes need one."
+BODY_MODEL_HELP = "SMPL or SMPL-X model file, or a folder of them, where the meshes need one."
 PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(

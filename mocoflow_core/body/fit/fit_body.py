@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,14 @@ from mocoflow_core.body.fit.posed_body import BodyPose, PosedBody
 from mocoflow_core.body.fit.prior import Fact, Prior, PriorConfig
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
 Array = NDArray[np.float64]
+_MESH_ARRAYS = ("frame_indices", "vertices", "faces", "keypoint_regressor")
+_UNKNOWNS = ("places", "rotations", "angles", "shape", "clothes")
 Progress = Callable[[float, str], None]
 
 _COCO = 17
@@ -56,6 +60,24 @@ class FittedBody:
     landmark_px: Array  # (T,) rms distance of the landmarks seen; NaN where none is
     silhouette_iou: Array  # (T,) NaN without a mask
     warnings: tuple[str, ...]
+
+    @property
+    def usual_overlap(self) -> float | None:
+        """Median intersection over union with the masks; None where there is no mask."""
+        known = self.silhouette_iou[np.isfinite(self.silhouette_iou)]
+        return float(np.median(known)) if len(known) else None
+
+    def save(self, folder: Path) -> None:
+        """Write ``meshes.npz``, which is a scene's mesh file, and ``fit.npz`` with all unknowns."""
+        meshes = {name: getattr(self.meshes, name) for name in _MESH_ARRAYS}
+        np.savez(folder / "meshes.npz", **meshes, coordinates="world", located=True)
+        unknowns = {name: getattr(self.pose, name) for name in _UNKNOWNS}
+        np.savez(
+            folder / "fit.npz",
+            **unknowns,
+            landmark_px=self.landmark_px,
+            silhouette_iou=self.silhouette_iou,
+        )
 
 
 def fit_body(
@@ -101,6 +123,24 @@ def fit_body(
         pose = _onto_masks(outlines, [prior, close], pose, configuration, progress)
         overlaps = outlines.overlaps(pose)
     return _fitted(body, pose, sightings, overlaps, camera, frame_indices, sized)
+
+
+def fit_to_clip(
+    sightings: Sightings, clip: Clip, configuration: BodyFitConfig, progress: Progress
+) -> FittedBody:
+    """The same for a clip's camera and masks; held-out frames are bridged, never looked at."""
+    held_out = clip.held_out[:, None]
+    if len(held_out) != len(sightings.places):
+        raise InputError(
+            f"landmarks of the clip's {len(held_out)} frames",
+            f"those of {len(sightings.places)}",
+            "Find them in the clip's own pictures.",
+        )
+    looked_at = replace(sightings, confidence=np.where(held_out, 0.0, sightings.confidence))
+    masks = clip.masks & ~held_out[..., None]
+    return fit_body(
+        looked_at, masks, clip.camera, clip.fps, configuration, clip.frame_indices, None, progress
+    )
 
 
 def _onto_masks(
@@ -202,7 +242,9 @@ def _warnings(sightings: Sightings, iou: Array, stature_m: float, sized: bool) -
     warnings = []
     unseen = int((~sightings.seen).sum())
     if unseen:
-        warnings.append(f"{unseen} of {len(iou)} frames show nobody and are bridged")
+        warnings.append(
+            f"{unseen} of {len(iou)} frames show nobody, or are held out, and are bridged"
+        )
     if np.isfinite(iou).any() and np.nanmedian(iou) < 0.7:
         warnings.append(f"the fitted body overlaps the masks by {np.nanmedian(iou):.2f} only")
     if not sized:

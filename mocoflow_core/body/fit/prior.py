@@ -62,7 +62,9 @@ class Prior:
         usual = (pose.angles - FREEDOM.usual) / FREEDOM.spread
         over = (pose.angles - FREEDOM.most).clip(0) + (pose.angles - FREEDOM.least).clip(None, 0)
         beyond = over / limit
-        slopes = np.stack([np.broadcast_to(1 / FREEDOM.spread, usual.shape), (over != 0) / limit], 1)
+        slopes = np.stack(
+            [np.broadcast_to(1 / FREEDOM.spread, usual.shape), (over != 0) / limit], 1
+        )
         count = len(FREEDOM.joint)
         by_frame = np.zeros((frames, 2 * count + 3, UNKNOWNS))
         for kind in range(2):
@@ -122,15 +124,19 @@ class Prior:
         for fact in self.facts:
             reading = self.body.readings[READINGS.index(fact.reading), :-1]
             rows.append(np.concatenate([reading, np.zeros(parts)])[None] / fact.spread)
-            off = self.body.reading(fact.reading, pose.shape) - fact.value
-            residuals.append(np.array([off / fact.spread]))
+            beside = self.body.reading(fact.reading, pose.shape) - fact.value
+            residuals.append(np.array([beside / fact.spread]))
         slopes, off = np.concatenate(rows), np.concatenate(residuals)
         # Each frame counts in full, although its errors are its neighbours': what is shared by all
         # frames has to weigh as much more.
         alike = min(len(pose.places), self.configuration.error_seconds / self.step_s)
-        heavier = np.sqrt(max(1.0, alike))
-        slopes, off = heavier * slopes, heavier * off
-        nothing = System.nothing(len(pose.places), UNKNOWNS, shapes + parts)
+        heavier = float(np.sqrt(max(1.0, alike)))
+        weighed = (heavier * slopes, heavier * off)
+        return self._common(pose, *weighed)
+
+    def _common(self, pose: BodyPose, slopes: Array, off: Array) -> System:
+        """Residuals (M,) of the shared unknowns alone, with derivatives (M, S)."""
+        nothing = System.nothing(len(pose.places), UNKNOWNS, slopes.shape[1])
         return System(
             0.5 * float(off @ off),
             nothing.gradient,

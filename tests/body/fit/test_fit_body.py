@@ -129,3 +129,13 @@ def test_a_lens_with_distortion_is_refused():
     camera = replace(made_camera(), distortion=np.array([0.1, 0, 0, 0, 0]))
     with pytest.raises(InputError, match="Undistort"):
         fit_body(seen(keypoints_of(POSE), made_camera()), None, camera, FPS, KNOWN)
+
+
+def test_what_is_saved_is_a_mesh_file_in_world_coordinates(exact, tmp_path):
+    exact.save(tmp_path)
+    with np.load(tmp_path / "meshes.npz", allow_pickle=False) as arrays:
+        assert str(arrays["coordinates"]) == "world"
+        assert bool(arrays["located"])
+        np.testing.assert_array_equal(arrays["vertices"], exact.meshes.vertices)
+    with np.load(tmp_path / "fit.npz", allow_pickle=False) as arrays:
+        np.testing.assert_array_equal(arrays["angles"], exact.pose.angles)
