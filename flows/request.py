@@ -53,7 +53,10 @@ class Request(BaseModel):
     @cached_property
     def scene(self) -> Scene:
         chosen = self.configuration
-        folder = scene_folder(self.scene_path, self.meshes is not None, chosen.meshes.body_model)
+        said = chosen.video if chosen.video != type(chosen.video)() else None
+        folder = scene_folder(
+            self.scene_path, self.meshes is not None, chosen.meshes.body_model, said
+        )
         return open_scene(folder, chosen.capture.train_camera)
 
     @cached_property
