@@ -31,7 +31,8 @@ class EstimateConfig(ConfigurationPart):
     kind: Kind | Literal["auto"] = Field("auto", description="Tool; auto: told by the content.")
     person: int | None = Field(None, description="Id of the person; null: the longest track.")
     body_model: Path | None = Field(
-        None, description="SMPL or SMPL-X model file of the user's: .pkl or .npz."
+        None,
+        description="SMPL or SMPL-X of the user's: a .pkl or .npz file, or a folder of them.",
     )
     faces: Path | None = Field(
         None, description="Mesh file whose faces the estimate shares, where no model is at hand."

@@ -76,7 +76,17 @@ def read_cropped(
         coordinates="camera-root-centred",
         located=False,
         first_translations=None if translations is None else where_known(translations),
-        remarks=(*chosen, *bodies.remarks, *placed),
+        remarks=(*chosen, *bodies.remarks, *placed, *_followed_poses(tool, track)),
+    )
+
+
+def _followed_poses(tool: str, track: Track) -> tuple[str, ...]:
+    """A remark where people were followed by 2-D poses: their boxes come from another routine."""
+    if "joints2d" not in track.arrays:
+        return ()
+    return (
+        f"{tool} followed 2-D poses, whose boxes another routine makes: compare the bodies with "
+        "the silhouettes, and set meshes.crop_factor where they are too large or too small",
     )
 
 
