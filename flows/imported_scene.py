@@ -1,4 +1,4 @@
-"""A data set's folder in place of a scene's: imported at first use, kept in the user's cache."""
+"""A data set or a bare video in place of a scene: imported at first use, kept in the cache."""
 
 from __future__ import annotations
 
@@ -10,33 +10,44 @@ from typing import TYPE_CHECKING
 import typer
 
 from flows.user_folders import body_models_folder, cache_folder
+from flows.video_options import is_bare_video
 from mocoflow_core.errors import InputError
 
 if TYPE_CHECKING:
     from mocoflow_core.configuration import ConfigurationPart
     from mocoflow_core.datasets.import_dataset import ImportedDataset
     from mocoflow_core.datasets.kinds import DatasetKind
+    from mocoflow_core.video.configuration import VideoConfig
 
 
 @lru_cache(maxsize=64)
-def scene_folder(path: Path, without_bodies: bool, body_model: Path | None = None) -> Path:
-    """The path itself, or the scene folder of the data set that lies there.
+def scene_folder(
+    path: Path,
+    without_bodies: bool,
+    body_model: Path | None = None,
+    video: VideoConfig | None = None,
+) -> Path:
+    """The path itself, or the scene folder of the data set or the video that lies there.
 
     Args:
         without_bodies: those of the data set are not needed.
         body_model: file or folder; by default the user's folder of them.
+        video: what was said of a bare video; nothing may be said of anything else.
 
-    The data set is read by its defaults and imported once for the same files (their names, sizes
+    A data set is read by its defaults and imported once for the same files (their names, sizes
     and times), the same configuration and version. Raises InputError as the import does.
     """
-    if path.suffix == ".json" or not path.is_dir() or (path / "scene.json").is_file():
+    filmed = is_bare_video(path)
+    if video and not filmed:
+        raise InputError("a bare video, of which something is said", f"{path}", "Leave it out.")
+    if not filmed and (not path.is_dir() or (path / "scene.json").is_file()):
         return path
-    from mocoflow_core.datasets.detect import detect_kind
+    from mocoflow_core.datasets.detect import kind_of
     from mocoflow_core.datasets.import_cache import import_once, place_of_import
     from tasks.terminal_bar import terminal_bar
 
-    kind = detect_kind(path)
-    configuration = _defaults(kind, without_bodies, body_model)
+    kind = kind_of("auto", path)
+    configuration = _without_bodies(kind, video, without_bodies) or choices(kind, (), body_model)
     folder = place_of_import(path, configuration, cache_folder() / "datasets")
     if folder.is_dir():
         typer.echo(f"{path} is {kind.name}, imported before: {folder}", err=True)
@@ -77,11 +88,10 @@ def choices(
     return configure(kind, settings, body_model)
 
 
-def _defaults(
-    kind: DatasetKind, without_bodies: bool, body_model: Path | None
-) -> ConfigurationPart:
-    from mocoflow_core.datasets.import_dataset import configure
-
+def _without_bodies(
+    kind: DatasetKind, said: ConfigurationPart | None, without_bodies: bool
+) -> ConfigurationPart | None:
+    """What was said, or the defaults, without bodies; None where nothing is to be changed."""
     if without_bodies and "bodies" in kind.configuration.model_fields:
-        return configure(kind, ("bodies=none",), None)
-    return choices(kind, (), body_model)
+        return (said or kind.configuration()).model_copy(update={"bodies": "none"})
+    return said

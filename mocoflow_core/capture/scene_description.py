@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from mocoflow_core.errors import InputError
 
 BehindPerson = Literal["kept", "plate", "white"]
+# Of meshes; "camera" is the train camera, and its axes alone where they are root-centred.
+Coordinates = Literal["world", "camera", "camera-root-centred"]
 
 
 class _Part(BaseModel):
@@ -42,7 +44,7 @@ class MeshesDescription(_Part):
     """The body mesh estimate: file, axes, and whether its translation can be trusted."""
 
     file: str
-    coordinates: Literal["world", "camera", "camera-root-centred"]
+    coordinates: Coordinates
     located: bool
     source: str = ""
 

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.frame_source import FrameSource
-from mocoflow_core.capture.scene_description import BehindPerson
+from mocoflow_core.capture.scene_description import BehindPerson, Coordinates
 from mocoflow_core.geometry.camera import Camera
 
-Coordinates = Literal["world", "camera", "camera-root-centred"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Mask = NDArray[np.bool_]  # (H, W), true on the person
 

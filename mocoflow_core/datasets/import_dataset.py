@@ -79,7 +79,7 @@ def import_dataset(
     Raises InputError as the reader and the checks do, for a folder with content, and a full disk.
     """
     require_new(out)
-    scene = _read(kind, source, configuration)
+    scene = _read(kind, source, configuration, progress)
     findings = check_dataset(scene)
     imported = ImportedDataset(
         scene.name,
@@ -102,10 +102,14 @@ def import_dataset(
     return imported
 
 
-def _read(kind: DatasetKind, source: Path, configuration: ConfigurationPart) -> DatasetScene:
-    """What the kind's reader makes of a folder, whatever lies in its files."""
+def _read(
+    kind: DatasetKind, source: Path, configuration: ConfigurationPart, progress: Progress | None
+) -> DatasetScene:
+    """What the kind's reader makes of a folder, whatever lies in its files; or of a file."""
+    if kind.source == "file":
+        return kind.open(source, configuration, progress)
     try:
-        return kind.read(source, configuration)
+        return kind.open(source, configuration, progress)
     except InputError:
         raise
     except _OF_OTHER_CONTENT as error:

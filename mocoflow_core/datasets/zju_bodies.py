@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_faces import read_faces
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.body.smpl_file import read_smpl_model
-from mocoflow_core.datasets.body_model_file import WHERE_TO_GET_IT, find_body_model
+from mocoflow_core.body.smpl_file import read_smpl_model, where_to_get
+from mocoflow_core.datasets.body_model_file import find_body_model
 from mocoflow_core.datasets.dataset_scene import DatasetMeshes
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.bodies import fitting_shapes
@@ -158,7 +158,7 @@ def _faces(kind: BodyKind, vertices: int, source: BodySource) -> tuple[NDArray[n
             f"the faces of SMPL, which {kind} come without",
             "none",
             "Name any mesh of a SMPL body (.obj, .ply, .glb; such as consensus.obj of "
-            f"People-Snapshot) with the field faces, or give a body model. {WHERE_TO_GET_IT}",
+            f"People-Snapshot) with the field faces, or give a body model. {where_to_get()}",
         )
     file = source.body_model
     if file.is_dir():

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from mocoflow_core.body.ingest import FileCoordinates
+from mocoflow_core.capture.scene_description import Coordinates
 from mocoflow_core.configuration import ConfigurationPart
 
 Kind = Literal[
@@ -54,7 +54,7 @@ class EstimateConfig(ConfigurationPart):
     pose_blend_shapes: Literal["on", "off"] = Field(
         "on", description="Off for bodies fitted without them: Neural Body's old params."
     )
-    coordinates: FileCoordinates | None = Field(
+    coordinates: Coordinates | None = Field(
         None, description="Where the meshes of a folder stand; null: what scene.json says."
     )
 

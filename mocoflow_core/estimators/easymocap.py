@@ -17,9 +17,9 @@ from mocoflow_core.body.blend_skinning import posed_vertices
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.bodies import fitting_shapes, shapes_of
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
+from mocoflow_core.estimators.estimate_file import EstimateFile, frame_numbers, read_stored
 from mocoflow_core.estimators.tracks import Track, choose_track
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ PARTS = {"Rh": 3, "Th": 3, "poses": 3 * JOINTS, "shapes": None}
 WITHOUT_BLEND_SHAPES = "params"
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """Records of one frame, or a folder of them."""
     if not stored.is_folder:
         return bool(_records(stored.content))
@@ -40,12 +40,12 @@ def recognises(stored: Stored) -> bool:
     return any(_records(read_stored(file)) for file in files)
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person in the world of the calibration. Raises InputError without the SMPL model."""
-    track, chosen = choose_track(_tracks(stored), known.chosen.person)
-    model = known.require_model(TOOL, "SMPL")
-    shape, remarks = shapes_of(fitting_shapes(track.rows("shapes"), model), known)
-    with_blend_shapes = known.chosen.pose_blend_shapes == "on"
+    track, chosen = choose_track(_tracks(stored), context.chosen.person)
+    model = context.require_model(TOOL, "SMPL")
+    shape, remarks = shapes_of(fitting_shapes(track.rows("shapes"), model), context)
+    with_blend_shapes = context.chosen.pose_blend_shapes == "on"
     if stored.path.name == WITHOUT_BLEND_SHAPES and with_blend_shapes:
         remarks = (
             *remarks,
@@ -141,7 +141,7 @@ def _records(content: object) -> list[Mapping[str, object]]:
     return found if len(found) == len(records) else []
 
 
-def _tracks(stored: Stored) -> list[Track]:
+def _tracks(stored: EstimateFile) -> list[Track]:
     files = stored.files(".npy", ".json") if stored.is_folder else [stored.path]
     people: dict[int | None, list[tuple[int, str, object]]] = defaultdict(list)
     for number, file in zip(frame_numbers(file.name for file in files), files, strict=True):

@@ -13,8 +13,8 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
 from mocoflow_core.estimators.read import read_estimate
 
 
@@ -38,8 +38,8 @@ def ingest_meshes(
             "none" if path is None else f"no file {path}",
             "Name a mesh file in scene.json, or give one with --meshes.",
         )
-    known = Known(scene.cameras[scene.train_camera], chosen, scene.description.meshes)
-    estimate = _numbered(read_estimate(path, known), scene)
+    context = EstimateContext(scene.cameras[scene.train_camera], chosen, scene.description.meshes)
+    estimate = _numbered(read_estimate(path, context), scene)
     return ingest_sequence(
         scene,
         MeshSequence(

@@ -35,6 +35,7 @@ VIEW_METRICS = {
     "mask_iou": MetricLabel("mask overlap", "", 3, True),
     "oks": MetricLabel("OKS", "", 3, True),
     "plausibility": MetricLabel("plausibility", "", 2, True),
+    "orbit_residual_mm": MetricLabel("keypoints around", "mm", 1, False),
     "train_psnr": MetricLabel("PSNR, train camera", "dB", 2, True),
 }
 

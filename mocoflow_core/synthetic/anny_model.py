@@ -8,6 +8,7 @@ data structures: two seconds, no files written, the same vertices.
 from __future__ import annotations
 
 import gzip
+from collections.abc import Sequence
 from pathlib import Path
 
 import anny
@@ -24,14 +25,17 @@ from mocoflow_core.synthetic.body_shape import BodyShape
 
 DTYPE = torch.float64
 
-# Folder and file name of the targets of each block; "newborn" has no file of its own.
+# Folder and file name of the targets of each block; "newborn" has no file of its own. Local
+# changes, lengths and girths of their own, lie in the folder of their part of the body.
 _TARGET_FILES = {
     "universal": "macrodetails/universal-{}.target.gz",
     "race": "macrodetails/{}.target.gz",
     "height": "macrodetails/height/{}.target.gz",
     "proportions": "macrodetails/proportions/{}.target.gz",
     "breast": "breast/{}.target.gz",
+    "local_change": "*/{}.target.gz",
 }
+_PHENOTYPE_BLOCKS = ("universal", "race", "height", "proportions", "breast")
 
 
 def load_anny(shape: BodyShape) -> anny.Anny:
@@ -40,7 +44,12 @@ def load_anny(shape: BodyShape) -> anny.Anny:
     Its rest pose stands upright along +z, faces -y, left hand at +x, metres; joint rotations
     (``pose_parameterization="local-ref"``) turn about these same axes.
     """
-    targets = _weighted_targets(shape)
+    targets, _ = phenotype_targets([shape])
+    return anny_with_targets(targets)
+
+
+def anny_with_targets(targets: dict[str, torch.Tensor]) -> anny.Anny:
+    """Anny restricted to some of its shape targets, label -> variation mask."""
     rig = RigConfig.from_string("anny")
     data = full_model._filter_rig(
         _read_model_data(rig, targets), rig.bones_to_remove, rig.subtree_root
@@ -64,28 +73,30 @@ def read_topology(name: str) -> tuple[np.ndarray, np.ndarray]:
     return vertices.numpy(), np.array(triangulate_faces(vertices, faces))
 
 
-def _weighted_targets(shape: BodyShape) -> dict[str, torch.Tensor]:
-    """Label -> variation mask of each phenotype target that this shape gives a weight."""
+def phenotype_targets(
+    shapes: Sequence[BodyShape],
+) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+    """Label -> variation mask of each target that some shape gives a weight; weights (S, N)."""
     variations = [name for names in PHENOTYPE_VARIATIONS.values() for name in names]
     labels = [
         label
         for label in _orientation_labels()
-        if label.split(":")[0] in _TARGET_FILES and "newborn" not in label
+        if label.split(":")[0] in _PHENOTYPE_BLOCKS and "newborn" not in label
     ]
     masks = torch.zeros((len(labels), len(variations)), dtype=DTYPE)
     for row, label in enumerate(labels):
         for name in label.split(":")[1].split("-"):
             masks[row, variations.index(name)] = 1
-    values = shape.model_dump()
     weights = phenotype_blendshape_weights(
-        torch.tensor([list(values.values())], dtype=DTYPE),
-        list(values),
+        torch.tensor([list(shape.model_dump().values()) for shape in shapes], dtype=DTYPE),
+        list(BodyShape.model_fields),
         make_phenotype_anchors(DTYPE),
         masks,
         extrapolate=False,
-    )[0]
+    )
     # An anchor such as 2/3 is met up to rounding: its neighbour's 1e-16 is no target to read.
-    return {labels[i]: masks[i] for i in torch.nonzero(weights > 1e-9)[:, 0].tolist()}
+    needed = torch.nonzero((weights > 1e-9).any(dim=0))[:, 0].tolist()
+    return {labels[i]: masks[i] for i in needed}, weights[:, needed]
 
 
 def _orientation_labels() -> list[str]:
@@ -95,7 +106,8 @@ def _orientation_labels() -> list[str]:
 
 def _read_target(label: str, vertex_count: int) -> torch.Tensor:
     block, name = label.split(":")
-    path: Path = get_anny_root_dir() / "data/mpfb2/targets" / _TARGET_FILES[block].format(name)
+    folder = Path(get_anny_root_dir()) / "data/mpfb2/targets"
+    (path,) = folder.glob(_TARGET_FILES[block].format(name))
     with gzip.open(path, "rt") as file:
         rows = np.array(file.read().split(), dtype=np.float64).reshape(-1, 4)
     offsets = torch.zeros((vertex_count, 3), dtype=DTYPE)
