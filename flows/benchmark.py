@@ -96,6 +96,7 @@ def misplaced_rows(request: BenchmarkRequest) -> list[dict[str, Any]]:
         misplace_views(
             *(request.store, shown.recording, shown.others, name),
             *(shown.configuration.capture, shown.configuration.evaluation),
+            shown.configuration.person_scores,
         )
         for name, shown in request.shifted_scenes()
     ]

@@ -13,6 +13,7 @@ from flows.finished_run import export, render
 from flows.import_dataset import import_dataset
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
+from flows.video_options import Clip, Focal, is_bare_video, video_settings
 from mocoflow_core.errors import InputError
 
 # Written out: presets and experiments themselves take torch, which takes a second.
@@ -20,13 +21,16 @@ EXPERIMENT_HELP = (
     "removal, progressive, misalignment, partial_observation, train_camera or worse_estimate: "
     "scenes, methods and presets of the paper's, where they are not given."
 )
-SCENE_HELP = "Folder with a scene.json, or of a data set; see docs/datasets."
+SCENE_HELP = "Folder with a scene.json, or of a data set (see docs/datasets), or a video file."
 MESHES_HELP = (
     "Body meshes to use instead: a file or folder of VIBE, PARE, WHAM, PHALP, 4D-Humans, GVHMR, "
     "TRAM, ROMP, BEV, AIST++ or EasyMocap, a folder of OBJ, PLY or GLB, or a meshes.npz."
 )
-PERSON_HELP = "Id of the person among those of --meshes; by default the longest track."
-BODY_MODEL_HELP = "SMPL or SMPL-X model file, where the meshes need one."
+PERSON_HELP = (
+    "Id of the person among those of --meshes, by default the longest track; of a bare video its "
+    "number, by default the only large one."
+)
+BODY_MODEL_HELP = "SMPL or SMPL-X model file, or a folder of them, where the meshes need one."
 PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(
@@ -56,6 +60,8 @@ def reconstruct(
     meshes: Annotated[Path | None, typer.Option(help=MESHES_HELP)] = None,
     person: Annotated[int | None, typer.Option(help=PERSON_HELP)] = None,
     body_model: Annotated[Path | None, typer.Option(help=BODY_MODEL_HELP)] = None,
+    focal: Annotated[float | None, Focal] = None,
+    clip: Annotated[str | None, Clip] = None,
     seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
     budget: Annotated[
         float | None, typer.Option(help="Seconds of the training clock.", min=1.0)
@@ -82,7 +88,7 @@ def reconstruct(
     from flows.request import Request
 
     out = out or Path(f"{scene.resolve().name}-reconstructed")
-    settings = _with_estimate(settings, person, body_model)
+    settings = _said(scene, meshes, settings, person, body_model, focal, clip)
     request = Request(
         scene_path=scene,
         preset=preset,
@@ -127,6 +133,8 @@ def plan(
     meshes: Annotated[Path | None, typer.Option(help=MESHES_HELP)] = None,
     person: Annotated[int | None, typer.Option(help=PERSON_HELP)] = None,
     body_model: Annotated[Path | None, typer.Option(help=BODY_MODEL_HELP)] = None,
+    focal: Annotated[float | None, Focal] = None,
+    clip: Annotated[str | None, Clip] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="One field of the configuration."),
@@ -137,7 +145,7 @@ def plan(
     from flows.request import Request
 
     # Bad settings are refused before anything heavy is loaded.
-    settings = _with_estimate(settings, person, body_model)
+    settings = _said(scene, meshes, settings, person, body_model, focal, clip)
     request = Request(scene_path=scene, preset=preset, meshes=meshes, settings=tuple(settings))
     request.check()
     set_environment()
@@ -157,11 +165,20 @@ def plan(
     print_plan(planned, Console())
 
 
-def _with_estimate(
-    settings: list[str] | None, person: int | None, body_model: Path | None
+def _said(
+    scene: Path,
+    meshes: Path | None,
+    settings: list[str] | None,
+    person: int | None,
+    body_model: Path | None,
+    focal: float | None,
+    clip: str | None,
 ) -> list[str]:
     """The settings, with those that have options of their own."""
-    own = [] if person is None else [f"meshes.person={person}"]
+    filmed = is_bare_video(scene) and meshes is None
+    own = video_settings(focal, clip, person if filmed else None, "video.")
+    if person is not None and not filmed:
+        own.append(f"meshes.person={person}")
     if body_model is not None:
         own.append(f"meshes.body_model={json.dumps(str(body_model))}")
     return [*(settings or ()), *own]

@@ -87,7 +87,8 @@ def reconstruct(
     )
     name = request.scene.description.name
     scores = score_views(
-        where, name, seed, views, trained, clip, evaluation, bodies, chosen.evaluation, chosen.truth
+        *(where, name, seed, views, trained, clip, evaluation, bodies),
+        *(chosen.evaluation, chosen.person_scores, chosen.truth),
     )
 
     stages = (*prepared.stages, trained, evaluation, views, scores)

@@ -9,11 +9,12 @@ from pydantic import BaseModel, ConfigDict
 
 from flows.imported_scene import scene_folder
 from flows.stopping import read_target
-from flows.user_folders import cache_folder
+from flows.user_folders import body_models_folder, cache_folder
 from mocoflow_core.capture.extract import select_training_frames
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.contradictions import require_sense
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.model_choice import choose_model
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.remote_store import open_store
 from mocoflow_core.io.run_folder import RunFolder, RunRecord
@@ -52,7 +53,10 @@ class Request(BaseModel):
     @cached_property
     def scene(self) -> Scene:
         chosen = self.configuration
-        folder = scene_folder(self.scene_path, self.meshes is not None, chosen.meshes.body_model)
+        said = chosen.video if chosen.video != type(chosen.video)() else None
+        folder = scene_folder(
+            self.scene_path, self.meshes is not None, chosen.meshes.body_model, said
+        )
         return open_scene(folder, chosen.capture.train_camera)
 
     @cached_property
@@ -97,8 +101,10 @@ class Request(BaseModel):
 
     @cached_property
     def body_model(self) -> Source | None:
-        """The body model's file, where one is given."""
-        return file_source(self.configuration.meshes.body_model, "--body-model")
+        """The body model's file: given, or in the given or the user's folder of them."""
+        meshes = self.bodies.path if self.bodies else None
+        file = choose_model(meshes, self.configuration.meshes, body_models_folder())
+        return file_source(file, "--body-model")
 
     @cached_property
     def faces(self) -> Source | None:
@@ -128,6 +134,7 @@ class Request(BaseModel):
             store=self.store.url,
             license=self.scene.description.license,
             attribution=self.scene.description.attribution,
+            remarks=tuple(self.scene.description.remarks),
         )
         return RunFolder.claim(out, begun)
 

@@ -18,6 +18,7 @@ from mocoflow_core.fields.skip_network import SkipConfig
 from mocoflow_core.losses.weights import LossConfig
 from mocoflow_core.methods.presentation import PresentationConfig
 from mocoflow_core.methods.truth_errors import TruthConfig
+from mocoflow_core.metrics.person_judge import PersonScoreConfig
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.plan import Representation
@@ -26,12 +27,14 @@ from mocoflow_core.rendering.sampling import SamplingConfig
 from mocoflow_core.training.mesh_views import MeshViewsConfig
 from mocoflow_core.training.pretrain_density import DensityConfig
 from mocoflow_core.training.schedule import ScheduleConfig
+from mocoflow_core.video.configuration import VideoConfig
 
 
 class Configuration(ConfigurationPart):
     """Everything that can be set, by stage."""
 
     representation: Representation = "hybrid"
+    video: VideoConfig = VideoConfig()
     capture: CaptureConfig = CaptureConfig()
     meshes: EstimateConfig = EstimateConfig()
     location: LocationConfig = LocationConfig()
@@ -47,6 +50,7 @@ class Configuration(ConfigurationPart):
     losses: LossConfig = LossConfig()
     schedule: ScheduleConfig = ScheduleConfig()
     evaluation: EvaluationConfig = EvaluationConfig()
+    person_scores: PersonScoreConfig = PersonScoreConfig()
     truth: TruthConfig = TruthConfig()
     presentation: PresentationConfig = PresentationConfig()
 
@@ -64,6 +68,7 @@ def toy() -> Configuration:
         canonical=CanonicalConfig(finest_m=0.04, levels=2),
         sampling=SamplingConfig(step_m=0.03),
         schedule=ScheduleConfig(coarse_steps=10, fine_steps=10, rays=64, threads=1),
+        person_scores=PersonScoreConfig(use="off"),
         presentation=PresentationConfig(turntable_views=4),
     )
 

@@ -34,7 +34,8 @@ def extract_clip(
     extracted = extract.extract_clip(scene, capture, needs, only)
     sound, warnings = sound_clip(extracted, capture.difference_threshold)
     mask_files = {} if needs.masks else scene.masks(scene.train_camera)
-    clip = composite_clip(scene, sound, capture.behind_person, mask_files)
+    behind_person = capture.behind(scene)
+    clip = composite_clip(scene, sound, behind_person, mask_files)
     selected, every = (
         len(extract.select_training_frames(scene, capture, some).all) for some in (only, None)
     )
@@ -50,7 +51,7 @@ def extract_clip(
         "source_fps": scene.description.fps,
         "up": scene.up.tolist(),
         "camera": {"name": clip.camera.name, **clip.camera.to_json()},
-        "behind_person": capture.behind_person,
+        "behind_person": behind_person,
         "shadowed": shadowed_area(sound),
         "warnings": [*clip.remarks, *warnings, *away],
     }

@@ -6,11 +6,12 @@ from mocoflow_core.artifacts import MisplacedViewsArtifact
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.methods.misplaced_views import misplaced_view_rows
+from mocoflow_core.metrics.person_judge import PersonScoreConfig
 from mocoflow_core.metrics.score import EvaluationConfig
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 1  # First version.
+ALGORITHM_VERSION = 2  # Plausibility, OKS and LPIPS.
 
 
 @stage(MisplacedViewsArtifact, ALGORITHM_VERSION)
@@ -21,12 +22,13 @@ def misplace_views(
     name: str,
     capture: CaptureConfig,
     evaluation: EvaluationConfig,
+    person: PersonScoreConfig,
 ) -> Summary:
     """What the scores make of a misplaced view (MoCo-Flow Table 1). Nothing is learned.
 
-    Output: in its summary. Some seconds. ``others`` are the files of the same scene that metrics
-    read.
+    Output: in its summary. Some seconds; a minute with networks. ``others`` are the files of
+    the same scene that metrics read.
     """
     scene = open_scene(recording.path, recording.train_camera)
-    rows = misplaced_view_rows(scene, name, capture, evaluation)
+    rows = misplaced_view_rows(scene, name, capture, evaluation, person)
     return {"rows": [row._asdict() for row in rows]}

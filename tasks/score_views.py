@@ -12,13 +12,14 @@ from mocoflow_core.artifacts import (
     ViewsArtifact,
 )
 from mocoflow_core.methods.scored_views import Subject
-from mocoflow_core.methods.scoring import ScoringFolders, score_run
+from mocoflow_core.methods.scoring import Judging, ScoringFolders, score_run
 from mocoflow_core.methods.truth_errors import TruthConfig
+from mocoflow_core.metrics.person_judge import PersonScoreConfig
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.training.clock import Seconds
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 3  # Distances to the truth at some frames of the clip.
+ALGORITHM_VERSION = 4  # Plausibility, OKS and LPIPS.
 
 
 @stage(ScoresArtifact, ALGORITHM_VERSION)
@@ -32,9 +33,12 @@ def score_views(
     evaluation: EvaluationArtifact,
     bodies: MeshArtifact | LocationArtifact,
     evaluating: EvaluationConfig,
+    person: PersonScoreConfig,
     truth: TruthConfig,
 ) -> Summary:
     """Scores as in the paper's sec. 4, for the trained scene and for the posed mesh.
+
+    Plausibility and OKS also of the photographs: the most that either could reach.
 
     Output: ``scores.parquet``, ``error_curve.parquet``. Seconds to minutes: the curve renders a
     few views at each kept state.
@@ -48,5 +52,6 @@ def score_views(
     )
     subject = Subject(scene, seed)
     before = Seconds(trained.summary["before_wall_s"], trained.summary["before_cpu_s"])
-    means = score_run(subject, folders, before, evaluating, truth, work.folder, work.progress)
-    return {"mean": means}
+    judging = Judging(evaluating, person, truth, tuple(clip.summary["up"]))
+    scored = score_run(subject, folders, before, judging, work.folder, work.progress)
+    return {"mean": scored.means, "warnings": list(scored.warnings)}

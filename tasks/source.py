@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.errors import InputError
-from mocoflow_core.estimators.stored import estimate_files
+from mocoflow_core.estimators.estimate_file import estimate_files
 from mocoflow_core.io.content_key import digest_document, digest_file, digest_files
 
 

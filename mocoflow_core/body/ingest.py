@@ -22,9 +22,9 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.motion_checks import check_frozen, check_turns
 from mocoflow_core.capture.frame_selection import require_contiguous
 from mocoflow_core.capture.scene import Scene
+from mocoflow_core.capture.scene_description import Coordinates
 from mocoflow_core.errors import InputError
 
-FileCoordinates = Literal["world", "camera", "camera-root-centred"]
 FIRST_TRANSLATIONS = "first_translations.npy"
 
 
@@ -73,7 +73,7 @@ class IngestedMeshes:
 def ingest_sequence(
     scene: Scene,
     raw: MeshSequence,
-    coordinates: FileCoordinates,
+    coordinates: Coordinates,
     located: bool,
     is_scenes_own: bool,
     first_translations: NDArray[np.float64] | None = None,
@@ -119,7 +119,7 @@ def ingest_sequence(
     )
 
 
-def _of_another_camera(scene: Scene, coordinates: FileCoordinates) -> tuple[str, ...]:
+def _of_another_camera(scene: Scene, coordinates: Coordinates) -> tuple[str, ...]:
     """What to know of meshes that were given for a camera that is now one of the others.
 
     Raises InputError where they stand in that camera's axes.

@@ -91,7 +91,10 @@ def require_frames(meshes: MeshSequence, expected: NDArray[np.int32], fps: float
     """Raise InputError unless the meshes belong to the video's frames, small gaps apart."""
     given = meshes.frame_indices
     counts = f"{len(given)} meshes for {len(expected)} frames"
-    action = "Fit the body to this very video, or cut either to the same frames."
+    action = (
+        "Fit the body to this very video, cut either to the same frames, or say with "
+        "--set meshes.first_frame=N where the estimate begins."
+    )
     if len(np.unique(given)) != len(given):
         raise InputError("each frame must have one mesh", "frames that come twice", action)
     foreign = np.setdiff1d(given, expected)

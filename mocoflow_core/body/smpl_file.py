@@ -7,6 +7,7 @@ the models are licensed to persons. Source: the keys of ``smplx/body_models.py``
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,14 @@ from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.untrusted import read_untrusted
 
+Family = Literal["SMPL", "SMPL-X"]
+
 SMPL_URL = "https://smpl.is.tue.mpg.de"
 SMPLX_URL = "https://smpl-x.is.tue.mpg.de"
+_EXAMPLES: dict[Family, str] = {
+    "SMPL": "SMPL_NEUTRAL.pkl (or the male or female one)",
+    "SMPL-X": "SMPLX_NEUTRAL.npz",
+}
 WITHOUT_MODEL = (
     "Sources that carry vertices need no model, only its faces: VIBE, WHAM, ROMP with its mesh "
     "option, ZJU-MoCap, mesh sequences."
@@ -61,21 +68,29 @@ def read_smpl_model(path: Path) -> SmplModel:
     return model
 
 
-def missing_model(found: str, kind: str = "SMPL") -> InputError:
+def missing_model(found: str, family: Family = "SMPL", needed: str | None = None) -> InputError:
     """The error for a source that needs a body model where there is none.
 
     Args:
         found: what is there instead.
-        kind: ``SMPL`` or ``SMPL-X``.
+        needed: what for, in words that end with the model; by default that a file is needed.
     """
-    if kind == "SMPL-X":
-        name, url = "SMPLX_NEUTRAL.npz", SMPLX_URL
-    else:
-        name, url = "SMPL_NEUTRAL.pkl (or the male or female one)", SMPL_URL
     return InputError(
-        f"a {kind} model file is needed, such as {name}",
+        needed or f"a {family} model file is needed, such as {_EXAMPLES[family]}",
         found,
-        f"Register at {url}, download it, and give its path as body_model. {WITHOUT_MODEL}",
+        f"{where_to_get(family)} {WITHOUT_MODEL}",
+    )
+
+
+def where_to_get(family: Family = "SMPL") -> str:
+    """What a user does to have a body model: they are licensed to persons."""
+    if family == "SMPL-X":
+        site = SMPLX_URL
+    else:
+        site = f"{SMPL_URL} (female and male) or https://smplify.is.tue.mpg.de (neutral)"
+    return (
+        f"Register at {site}, download {family} under its own licence, and give the file (.pkl or "
+        ".npz), or the folder that holds it, with --body-model."
     )
 
 

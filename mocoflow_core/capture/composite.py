@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -17,12 +16,12 @@ from numpy.typing import NDArray
 
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.scene import Scene
+from mocoflow_core.capture.scene_description import BehindPerson
 from mocoflow_core.capture.strange_frames import listed
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.capture.working_pictures import source_mask
 
 Picture = NDArray[np.uint8]
-BehindPerson = Literal["kept", "plate", "white"]
 WHITE = 255
 # Without it a person of 96 pixels was learned 0.2 dB worse.
 RIM_PX = 1

@@ -13,7 +13,7 @@ from mocoflow_core.capture.background import (
     plate_without_masks,
 )
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.capture.composite import BehindPerson, composite_clip
+from mocoflow_core.capture.composite import composite_clip
 from mocoflow_core.capture.frame_selection import (
     FrameSelection,
     require_contiguous,
@@ -21,6 +21,7 @@ from mocoflow_core.capture.frame_selection import (
 )
 from mocoflow_core.capture.repeated_frames import repeated_frames
 from mocoflow_core.capture.scene import Scene
+from mocoflow_core.capture.scene_description import BehindPerson
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.capture.working_pictures import working_frames, working_masks, working_plate
 from mocoflow_core.configuration import ConfigurationPart
@@ -62,11 +63,16 @@ class CaptureConfig(ConfigurationPart):
     difference_threshold: int = Field(
         30, ge=1, le=255, description="Difference to the plate that counts as the person, 1/255."
     )
-    behind_person: BehindPerson = Field(
-        "kept",
-        description="What the frames show around the person: what the camera saw, the background "
-        "plate, which removes cast shadows (the paper for AIST), or white (for People-Snapshot).",
+    behind_person: BehindPerson | None = Field(
+        None,
+        description="What the frames show around the person: what the camera saw (kept), the "
+        "background plate, which removes cast shadows (the paper for AIST), or white (for "
+        "People-Snapshot); null: what scene.json says, by default kept.",
     )
+
+    def behind(self, scene: Scene) -> BehindPerson:
+        """What is behind the person: as chosen, or as the scene says."""
+        return self.behind_person or scene.description.behind_person
 
 
 class ClipNeeds(ConfigurationPart):
@@ -129,7 +135,7 @@ def extract_evaluation(
         if len(scored):
             selection = FrameSelection(scored[:0], scored, scene.description.fps)
             seen = extract_camera(scene, name, selection, configuration)
-            behind = configuration.behind_person
+            behind = configuration.behind(scene)
             clips.append(composite_clip(scene, seen, behind, scene.masks(name)))
     return clips
 
@@ -191,7 +197,7 @@ def extract_camera(
         masks = masks_from_plate(frames, plate, configuration.difference_threshold)
     if plate is None or needs.background:
         plate, guessed = _plate(frames, masks, usable, configuration)
-        if guessed:
+        if guessed and configuration.behind(scene) != "white":
             remarks.append(
                 f"the person covers {100 * guessed:.2g} % of the picture of {name} in every "
                 "frame: the background there is filled from around"

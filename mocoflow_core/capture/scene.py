@@ -87,6 +87,8 @@ class Scene:
         values = self.description.model_dump(mode="json", include=known)
         camera = self.description.cameras[self.train_camera]
         values |= {"train_camera": self.train_camera, "camera": camera.model_dump(mode="json")}
+        stated = self.description.model_dump(include={"source_begins_at", "behind_person"})
+        values |= {name: value for name, value in stated.items() if value not in (None, "kept")}
         # What was estimated for another camera is known to be so.
         return values | ({"meshes_for": self.meshes_for} if self.is_seen_from_elsewhere else {})
 

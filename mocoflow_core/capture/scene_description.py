@@ -10,6 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mocoflow_core.errors import InputError
 
+BehindPerson = Literal["kept", "plate", "white"]
+# Of meshes; "camera" is the train camera, and its axes alone where they are root-centred.
+Coordinates = Literal["world", "camera", "camera-root-centred"]
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -40,7 +44,7 @@ class MeshesDescription(_Part):
     """The body mesh estimate: file, axes, and whether its translation can be trusted."""
 
     file: str
-    coordinates: Literal["world", "camera", "camera-root-centred"]
+    coordinates: Coordinates
     located: bool
     source: str = ""
 
@@ -61,13 +65,23 @@ class SceneDescription(_Part):
     working_fps: float = Field(
         12.0, gt=0, allow_inf_nan=False, description="Rate to learn from; the paper's (sec. 4)."
     )
+    source_begins_at: int | None = Field(
+        None,
+        ge=0,
+        description="Where frames were cut out of a longer recording and keep its numbers: the "
+        "number of its first frame. Null: the frames are all there is.",
+    )
     world: WorldDescription
     train_camera: str
     cameras: dict[str, CameraDescription]
+    behind_person: BehindPerson = Field(
+        "kept", description="What capture.behind_person is where it says nothing."
+    )
     meshes: MeshesDescription | None = None
     truth: TruthDescription | None = None
     license: str = ""
     attribution: str = ""
+    remarks: list[str] = Field([], description="For whoever reads the scores; on the report.")
 
 
 def read_description(file: Path) -> SceneDescription:

@@ -24,7 +24,9 @@ from mocoflow_core.datasets.aist_views import (
     train_view,
 )
 from mocoflow_core.datasets.camera_up import up_of_cameras
+from mocoflow_core.datasets.caveats import of_masks_near, of_multi_view_bodies
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
+from mocoflow_core.datasets.links import require_inside
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.aist_motion import METRES, Motion, read_motion
 from mocoflow_core.geometry.camera import Camera
@@ -57,12 +59,15 @@ def read_aist(
     Frame numbers count the 60 Hz grid of the annotations. The videos are looked at for their
     plates; frames are read when written.
 
-    Raises InputError for names, cameras, videos, motions or body models that are wrong or missing.
+    Raises InputError for links that lead out of a folder, and for names, cameras, videos, motions
+    or body models that are wrong or missing.
     """
     files = find_files(
         source, configuration.sequence, configuration.videos, configuration.annotations
     )
     require_annotated(files.name)
+    require_inside(files.videos, files.recordings, configuration.links)
+    require_inside(files.annotations, files.annotated, configuration.links)
     ignored = _ignored(files, configuration)
     motion = read_motion(files.motion) if files.motion.is_file() else None
     unit_m, unit_remark = _unit(motion, configuration)
@@ -90,6 +95,11 @@ def read_aist(
         license=LICENSE,
         attribution=ATTRIBUTION,
         remarks=(*remarks, *body_remarks, *truth_remarks, *up_remarks, *_floor(meshes, up)),
+        behind_person="plate" if configuration.background == "plate" else "kept",
+        caveats=(
+            *of_multi_view_bodies(meshes),
+            *(() if configuration.masks else of_masks_near(meshes)),
+        ),
         working_fps=GRID_FPS / configuration.stride,
     )
 
@@ -165,7 +175,6 @@ def _view_choice(meshes: DatasetMeshes | None, configuration: AistConfig) -> Vie
     return ViewChoice(
         configuration.rounding,
         configuration.masks,
-        configuration.background,
         PlateChoice(configuration.plate_frames, configuration.difference_threshold),
         meshes.sequence if meshes else None,
     )
@@ -185,7 +194,7 @@ def _cameras(
     remarks = ["masks are the user's" if choice.masks else made]
     for name in dict.fromkeys(names):
         ticks = clip[::stride] if cameras else clip
-        cameras[name], said = open_view(files, calibrated[name], ticks, choice)
+        cameras[name], said = open_view(files, calibrated[name], ticks, clip[::stride], choice)
         remarks += said
     return cameras, tuple(remarks)
 
@@ -211,7 +220,7 @@ def _meshes(
 def _up(calibrated: dict[str, Camera], configuration: AistConfig) -> tuple[Up, tuple[str, ...]]:
     if configuration.up:
         return configuration.up, (f"up is {configuration.up}, as asked for",)
-    up, remark = up_of_cameras(calibrated.values(), EXPECTED_UP)
+    up, remark = up_of_cameras((camera.R for camera in calibrated.values()), EXPECTED_UP)
     return up, (remark,)
 
 

@@ -53,7 +53,12 @@ def read_cameras(folder: Path, sequence: str, unit_m: float) -> dict[str, Camera
         raise InputError(
             f"a sequence among the {len(mapping)} of mapping.txt", sequence, "Check its name."
         )
-    file = _require(folder / f"{mapping[sequence]}.json", f"the cameras of {sequence}")
+    setting = mapping[sequence]
+    if not re.fullmatch(r"\w+", setting):
+        raise InputError(
+            "a setting's name in mapping.txt, as setting1", f"{setting!r:.60}", "Unpack it again."
+        )
+    file = _require(folder / f"{setting}.json", f"the cameras of {sequence}")
     cameras = [_camera(values, file.name, unit_m) for values in _listed(file)]
     return {camera.name: camera for camera in cameras}
 

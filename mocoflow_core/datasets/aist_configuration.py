@@ -11,8 +11,7 @@ from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.aist_names import BAD_VIEWS
 from mocoflow_core.datasets.aist_time import Rounding
 from mocoflow_core.datasets.dataset_scene import Up
-
-Background = Literal["plate", "filmed"]
+from mocoflow_core.datasets.links import LINKS, Links
 
 
 class AistConfig(ConfigurationPart):
@@ -58,10 +57,14 @@ class AistConfig(ConfigurationPart):
     masks: Path | None = Field(
         None, description="Folder with <video name>/000000.png; null: what differs from the plate."
     )
-    background: Background = Field(
-        "plate", description="Around the person: the clip's median (no shadows), or as filmed."
+    background: Literal["plate", "filmed"] = Field(
+        "plate",
+        description="Plate: a reconstruction sets the person before the clip's median, without "
+        "moving shadows; the scene's frames are as filmed.",
     )
-    plate_frames: int = Field(48, ge=1, description="Frames that make the median, over the clip.")
+    plate_frames: int = Field(
+        48, ge=1, description="Frames that make the median, of those learned from."
+    )
     difference_threshold: int = Field(
         30, ge=1, le=255, description="Difference to the plate that counts as the person, 1/255."
     )
@@ -72,3 +75,4 @@ class AistConfig(ConfigurationPart):
         None, description="Male SMPL model file, or the folder it is in."
     )
     up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
+    links: Links = Field("inside", description=LINKS)

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mocoflow_core.datasets.aist_names import AistName, parse_name
+from mocoflow_core.datasets.links import links_below
 from mocoflow_core.errors import InputError
 
 VIDEO_SUFFIX = ".mp4"
+CAMERAS = 9
 # Beside or inside the folder that the user points at.
 _ANNOTATION_FOLDERS = (".", "annotations", "aist_plusplus_final")
 _VIDEO_FOLDERS = (".", "videos")
@@ -38,6 +40,17 @@ class AistFiles:
     @property
     def ignore_list(self) -> Path:
         return self.annotations / "ignore_list.txt"
+
+    @property
+    def recordings(self) -> list[Path]:
+        """The videos of all cameras."""
+        return [self.video(f"c{number:02d}") for number in range(1, CAMERAS + 1)]
+
+    @property
+    def annotated(self) -> list[Path]:
+        """The annotations; of the cameras their folder and what in it is a link."""
+        linked = links_below(self.cameras) if self.cameras.is_dir() else ()
+        return [self.cameras, *linked, self.motion, self.keypoints, self.ignore_list]
 
     def video(self, camera: str) -> Path:
         return self.videos / f"{self.name.video(camera)}{VIDEO_SUFFIX}"

@@ -97,16 +97,22 @@ def masks_in_folder(folder: Path, frames: GridFrames) -> ImageMasks:
 
 
 def clip_plate(
-    frames: FrameSource, masks: MaskSource | None, bodies: BodyRegions | None, choice: PlateChoice
+    frames: FrameSource,
+    masks: MaskSource | None,
+    bodies: BodyRegions | None,
+    choice: PlateChoice,
+    among: NDArray[np.int32],
 ) -> Image:
-    """The median background (H, W, 3) over some frames, spread over the clip.
+    """The median background (H, W, 3) over some of the frames ``among``, spread over them.
+
+    Held-out frames are none of these: the plate is learned from.
 
     Masks say where the person is; else bodies do, for who dances on the spot is part of a plain
     median; without either the person is what moves.
     """
-    known = frames.indices
+    known = np.intersect1d(frames.indices, among)
     if masks is not None:
-        known = masks.indices
+        known = np.intersect1d(known, masks.indices)
     elif bodies is not None:
         known = np.intersect1d(known, bodies.numbers)
     rows = np.linspace(0, len(known) - 1, min(choice.frames, len(known))).round().astype(int)

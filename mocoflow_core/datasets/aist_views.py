@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.capture.frame_source import FrameSource
 from mocoflow_core.datasets.aist_cameras import for_pictures
-from mocoflow_core.datasets.aist_configuration import Background
 from mocoflow_core.datasets.aist_files import AistFiles
 from mocoflow_core.datasets.aist_masks import (
     DifferenceMasks,
@@ -24,7 +22,6 @@ from mocoflow_core.datasets.aist_names import NEVER_RELEASED
 from mocoflow_core.datasets.aist_time import GRID_FPS, GridFrames, Rounding, ticks_of
 from mocoflow_core.datasets.body_regions import BodyRegions
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, MaskSource
-from mocoflow_core.datasets.frames_on_plate import FramesOnPlate
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.video import describe_video, read_frames
@@ -40,7 +37,6 @@ class ViewChoice:
 
     rounding: Rounding
     masks: Path | None  # folder with <video name>/%06d.png
-    background: Background
     plate: PlateChoice
     bodies: MeshSequence | None  # world metres; about where the person is
 
@@ -92,9 +88,9 @@ def available_ticks(video: Path, rounding: Rounding) -> tuple[Indices, tuple[str
 
 
 def open_view(
-    files: AistFiles, camera: Camera, wanted: Indices, choice: ViewChoice
+    files: AistFiles, camera: Camera, wanted: Indices, learned: Indices, choice: ViewChoice
 ) -> tuple[DatasetCamera, tuple[str, ...]]:
-    """One camera with those of the wanted ticks that its video has.
+    """One camera with those of the wanted ticks that its video has; its plate is of the learned.
 
     Raises InputError for a video of another shape, and for masks that are not where they should.
     """
@@ -111,9 +107,6 @@ def open_view(
     if choice.masks:
         masks = masks_in_folder(choice.masks / video.stem, frames)
     bodies = BodyRegions(choice.bodies, fitted) if choice.bodies else None
-    plate = clip_plate(frames, masks, bodies, choice.plate)
+    plate = clip_plate(frames, masks, bodies, choice.plate, learned)
     masks = masks or DifferenceMasks(frames, plate, choice.plate.threshold, bodies)
-    shown: FrameSource = frames
-    if choice.background == "plate":
-        shown = FramesOnPlate(frames, masks, plate)
-    return DatasetCamera(fitted, shown, masks, plate), remarks
+    return DatasetCamera(fitted, frames, masks, plate), remarks

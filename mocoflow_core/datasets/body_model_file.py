@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import Literal
 
+from mocoflow_core.body.model_folder import Gender, genders_of, models_in
+from mocoflow_core.body.smpl_file import where_to_get
 from mocoflow_core.errors import InputError
-
-Gender = Literal["female", "male", "neutral"]
-
-# SMPL_FEMALE.pkl, basicModel_f_lbs_10_207_0_v1.0.0.pkl and their relatives, without their ending.
-_NAMES: dict[Gender, re.Pattern[str]] = {
-    "female": re.compile(r"smpl_female|basic_?model_f(emale)?_", re.IGNORECASE),
-    "male": re.compile(r"smpl_male|basic_?model_m(ale)?_", re.IGNORECASE),
-    "neutral": re.compile(r"smpl_neutral|basic_?model_neutral_", re.IGNORECASE),
-}
-_ENDINGS = (".pkl", ".npz")
-# Data sets were made with version 1.0; later versions have other shapes for the same numbers.
-_FIRST_VERSION = "v1.0"
-WHERE_TO_GET_IT = (
-    "Get SMPL at smpl.is.tue.mpg.de (female and male) or smplify.is.tue.mpg.de (neutral) under "
-    "its own licence, and give the file, or the folder that holds it, with --body-model."
-)
 
 
 def find_body_model(given: Path | None, gender: Gender, purpose: str) -> tuple[Path, str | None]:
@@ -35,28 +19,21 @@ def find_body_model(given: Path | None, gender: Gender, purpose: str) -> tuple[P
     """
     required = f"the {gender} SMPL model to {purpose}"
     if given is None:
-        raise InputError(required, "none", WHERE_TO_GET_IT)
+        raise InputError(required, "none", where_to_get())
     if given.is_file():
         return given, _doubt(given, gender)
     if not given.is_dir():
-        raise InputError(required, f"nothing at {given}", WHERE_TO_GET_IT)
-    found = sorted(
-        (
-            path
-            for path in given.rglob("*")
-            if path.suffix.lower() in _ENDINGS and _NAMES[gender].match(path.stem)
-        ),
-        key=lambda path: (_FIRST_VERSION not in path.name, len(path.parts), path.name),
-    )
+        raise InputError(required, f"nothing at {given}", where_to_get())
+    found = models_in(given, "SMPL", gender)
     if not found:
-        raise InputError(required, f"a folder without it, {given}", WHERE_TO_GET_IT)
+        raise InputError(required, f"a folder without it, {given}", where_to_get())
     others = ", ".join(path.name for path in found[1:])
     return found[0], f"of several models {found[0].name} is taken, not {others}" if others else None
 
 
 def _doubt(file: Path, gender: Gender) -> str | None:
     """A remark where a file's name says another gender."""
-    said = [other for other, pattern in _NAMES.items() if pattern.match(file.stem)]
+    said = genders_of(file)
     if not said or gender in said:
         return None
     return f"the body model {file.name} is {said[0]} by its name; the data set needs {gender}"

@@ -26,7 +26,8 @@ from mocoflow_core.capture.checks import check_lens, check_share
 from mocoflow_core.capture.frame_selection import require_contiguous
 from mocoflow_core.capture.scene import UP_VECTORS
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene
-from mocoflow_core.datasets.sampled_masks import SampledMasks, require_size, sample_masks
+from mocoflow_core.datasets.picture_size import require_size
+from mocoflow_core.datasets.sampled_masks import SampledMasks, sample_masks
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
@@ -36,13 +37,27 @@ HOPELESS_OVERLAP = 0.1
 
 @dataclass(frozen=True)
 class DatasetFindings:
-    """Measured values by name, and what is unusual among them."""
+    """Measured values by name, and what is unusual among them.
+
+    What evaluation cameras show stands apart: choices must not be made by it.
+    """
 
     measured: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # of the scene and the train camera
+    elsewhere: tuple[str, ...] = ()  # of the evaluation cameras
 
     def __add__(self, other: DatasetFindings) -> DatasetFindings:
-        return DatasetFindings({**self.measured, **other.measured}, self.warnings + other.warnings)
+        return DatasetFindings(
+            {**self.measured, **other.measured},
+            self.warnings + other.warnings,
+            self.elsewhere + other.elsewhere,
+        )
+
+    def of(self, camera: str, train_camera: str) -> DatasetFindings:
+        """The same, its warnings those of a camera."""
+        if camera == train_camera:
+            return self
+        return DatasetFindings(self.measured, elsewhere=self.warnings + self.elsewhere)
 
 
 def check_dataset(scene: DatasetScene) -> DatasetFindings:
@@ -59,15 +74,16 @@ def check_dataset(scene: DatasetScene) -> DatasetFindings:
         raise InputError(f"frames of {scene.train_camera}", "none", "Check the chosen clip.")
     require_contiguous(train.frames.indices, f"frames of {scene.train_camera}")
     findings = _check_counts(scene, train)
-    for camera in scene.cameras.values():
-        findings += _check_camera(camera)
+    for name, camera in scene.cameras.items():
+        findings += _check_camera(camera).of(name, scene.train_camera)
     sampled = {
         name: sample_masks(camera.camera, camera.masks, camera.frames.indices)
         for name, camera in scene.cameras.items()
         if camera.masks is not None
     }
     for name, masks in sampled.items():
-        findings += _check_foreground(name, masks, required=name == scene.train_camera)
+        found = _check_foreground(name, masks, required=name == scene.train_camera)
+        findings += found.of(name, scene.train_camera)
     return findings + _check_body(scene, sampled) if scene.meshes else findings
 
 
@@ -96,7 +112,7 @@ def _check_camera(recorded: DatasetCamera) -> DatasetFindings:
     camera, first = recorded.camera, recorded.frames.indices[:1].tolist()
     require_calibration(camera, "the data set's calibration")
     for number, image in recorded.frames.read(first):
-        require_size(image, camera, f"frame {number} of {camera.name}")
+        require_size(image.shape[1::-1], camera.size, f"frame {number} of {camera.name}")
     return DatasetFindings(warnings=check_lens(camera))
 
 
@@ -129,10 +145,11 @@ def _check_body(scene: DatasetScene, sampled: dict[str, SampledMasks]) -> Datase
     for name, recorded in scene.cameras.items():
         require_in_front(world, recorded.camera)
         distance, far = check_distance(world, recorded.camera)
-        findings += DatasetFindings({f"distance_m of {name}": distance}, far)
+        found = DatasetFindings({f"distance_m of {name}": distance}, far)
         if name in sampled and len(sampled[name].numbers):
             required = name == scene.train_camera
-            findings += _check_overlap(name, sampled[name], world, required)
+            found += _check_overlap(name, sampled[name], world, required)
+        findings += found.of(name, scene.train_camera)
     return findings
 
 

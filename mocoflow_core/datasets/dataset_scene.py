@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.frame_source import FrameSource
+from mocoflow_core.capture.scene_description import BehindPerson, Coordinates
 from mocoflow_core.geometry.camera import Camera
 
-Coordinates = Literal["world", "camera", "camera-root-centred"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Mask = NDArray[np.bool_]  # (H, W), true on the person
 
@@ -36,7 +36,7 @@ class MaskSource(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class DatasetCamera:
-    """A camera with its recording. The chosen frames only; numbers are the source's."""
+    """A camera with its recording as filmed. The chosen frames only, by the source's numbers."""
 
     camera: Camera  # of the pictures as stored, distortion included; K with the corner origin
     frames: FrameSource
@@ -70,7 +70,8 @@ class DatasetScene:
 
     The train camera has every frame from its first to its last, as held-out frames lie between
     those that are learned from; ``working_fps`` thins them out. Other cameras may have gaps.
-    ``remarks`` say everything that was assumed, chosen, skipped or missing, in words.
+    ``remarks`` say everything that was assumed, chosen, skipped or missing, in words; ``caveats``
+    what scores must be read with.
     """
 
     name: str
@@ -83,4 +84,7 @@ class DatasetScene:
     license: str
     attribution: str
     remarks: tuple[str, ...] = ()
+    caveats: tuple[str, ...] = ()
+    behind_person: BehindPerson = "kept"  # by default; the frames are as filmed
+    source_begins_at: int = 0  # the first number of the recording that the clip was cut out of
     working_fps: float | None = None  # to learn from; by default the paper's 12

@@ -12,9 +12,9 @@ _NAMED_SUBJECTS = 5
 
 
 def kind_of(name: str, folder: Path) -> DatasetKind:
-    """The kind of a name; of the folder where the name is ``auto``. Raises InputError."""
+    """The kind of a name; of the folder or file where it is ``auto``. Raises InputError."""
     if name == "auto":
-        return detect_kind(folder)
+        return KINDS["video"] if folder.is_file() else detect_kind(folder)
     if name not in KINDS:
         raise InputError(
             "a kind of data set", repr(name), f"Choose one of auto, {', '.join(KINDS)}."
@@ -30,6 +30,7 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
     """
     if not folder.is_dir():
         raise InputError("a folder of a data set", f"nothing at {folder}", "Check the path.")
+    kinds = {name: kind for name, kind in kinds.items() if kind.source == "folder"}
     missing = {name: kind.missing(folder) for name, kind in kinds.items()}
     found = [kinds[name] for name, parts in missing.items() if not parts]
     if len(found) == 1:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.dataset_checks import check_dataset
+from mocoflow_core.datasets.dataset_scene import DatasetScene
 from mocoflow_core.datasets.kinds import DatasetKind
 from mocoflow_core.datasets.write_dataset import require_new, write_dataset
 from mocoflow_core.errors import InputError
@@ -15,18 +16,32 @@ from mocoflow_core.settings import with_settings
 
 Progress = Callable[[float, str], None]
 # Counts up when the same files give another scene folder.
-ALGORITHM_VERSION = 1
+ALGORITHM_VERSION = 2  # Pictures as filmed; scene.json says what they are set before.
+
+# Whatever values of another type, size or nesting than the data set's lead to.
+_OF_OTHER_CONTENT = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
 
 
 @dataclass(frozen=True)
 class ImportedDataset:
-    """What was assumed, measured and found unusual, in words and numbers."""
+    """What was assumed, measured and found unusual, in words and numbers.
+
+    ``warnings`` are of the scene and its train camera, ``elsewhere`` of the evaluation cameras.
+    """
 
     name: str
     train_camera: str
     remarks: tuple[str, ...]
     measured: dict[str, float]
     warnings: tuple[str, ...]
+    elsewhere: tuple[str, ...]
 
     @property
     def of_train_camera(self) -> dict[str, float]:
@@ -64,10 +79,15 @@ def import_dataset(
     Raises InputError as the reader and the checks do, for a folder with content, and a full disk.
     """
     require_new(out)
-    scene = kind.read(source, configuration)
+    scene = _read(kind, source, configuration, progress)
     findings = check_dataset(scene)
     imported = ImportedDataset(
-        scene.name, scene.train_camera, scene.remarks, findings.measured, findings.warnings
+        scene.name,
+        scene.train_camera,
+        (*scene.remarks, *scene.caveats),
+        findings.measured,
+        findings.warnings,
+        findings.elsewhere,
     )
     record = {
         "kind": kind.name,
@@ -76,6 +96,26 @@ def import_dataset(
         "remarks": imported.remarks,
         "measured": imported.measured,
         "warnings": imported.warnings,
+        "warnings_of_evaluation_cameras": imported.elsewhere,
     }
     write_dataset(scene, out, record, progress)
     return imported
+
+
+def _read(
+    kind: DatasetKind, source: Path, configuration: ConfigurationPart, progress: Progress | None
+) -> DatasetScene:
+    """What the kind's reader makes of a folder, whatever lies in its files; or of a file."""
+    if kind.source == "file":
+        return kind.open(source, configuration, progress)
+    try:
+        return kind.open(source, configuration, progress)
+    except InputError:
+        raise
+    except _OF_OTHER_CONTENT as error:
+        words = f"{type(error).__name__}: {next(iter(str(error).splitlines()), '')[:100]}"
+        raise InputError(
+            f"files of {kind.name} as they were distributed",
+            f"others in {source} ({words})",
+            "Copy them again from the data set.",
+        ) from error

@@ -14,21 +14,6 @@ from mocoflow_core.datasets.dataset_scene import Mask, MaskSource
 
 
 @dataclass(frozen=True, eq=False)
-class ChosenMasks:
-    """Only some of the masks of a source, under their own numbers."""
-
-    source: MaskSource
-    indices: NDArray[np.int32]  # (N,) ascending
-
-    @property
-    def files(self) -> list[Path]:
-        return self.source.files
-
-    def read(self, wanted: Collection[int]) -> Iterator[tuple[int, Mask]]:
-        return self.source.read(wanted)
-
-
-@dataclass(frozen=True, eq=False)
 class ErodedMasks:
     """Masks made smaller by a square of ``side_px`` (Neural Body: 4 for People-Snapshot)."""
 

@@ -12,14 +12,16 @@ from pydantic import Field
 
 from mocoflow_core.capture.frame_source import VideoFrames
 from mocoflow_core.configuration import ConfigurationPart
-from mocoflow_core.datasets.chosen_frames import WHITE, ChosenFrames, FramesOnWhite
+from mocoflow_core.datasets.chosen import Chosen
 from mocoflow_core.datasets.dataset_scene import (
     DatasetCamera,
     DatasetMeshes,
     DatasetScene,
 )
 from mocoflow_core.datasets.hdf5_masks import Hdf5Masks
-from mocoflow_core.datasets.mask_sources import ChosenMasks, ErodedMasks
+from mocoflow_core.datasets.links import LINKS, Links, require_inside
+from mocoflow_core.datasets.mask_sources import ErodedMasks
+from mocoflow_core.datasets.picture_size import require_size
 from mocoflow_core.datasets.pose_alignment import PoseAlignment, align_poses
 from mocoflow_core.datasets.sampled_masks import sample_masks
 from mocoflow_core.datasets.snapshot_bodies import BodyShape, SnapshotGender, open_bodies
@@ -64,7 +66,9 @@ class PeopleSnapshotConfig(ConfigurationPart):
         2, ge=1, description="Every n-th frame is learned from: 24 to 12 per second in the paper."
     )
     background: Literal["white", "filmed"] = Field(
-        "white", description="White: pixels outside the masks are, as in the paper."
+        "white",
+        description="White: what a reconstruction sets the person before, as in the paper; the "
+        "scene's frames are as filmed.",
     )
     mask_erosion_px: int = Field(
         0, ge=0, le=64, description="Side of the square that masks shrink by; Neural Body: 4."
@@ -85,6 +89,7 @@ class PeopleSnapshotConfig(ConfigurationPart):
     most_surplus: int = Field(
         1, ge=0, description="By how many frames, masks and poses may differ in number."
     )
+    links: Links = Field("inside", description=LINKS)
 
 
 def read_people_snapshot(
@@ -95,10 +100,13 @@ def read_people_snapshot(
 
     The video is decoded once to count its frames; masks and frames are read when written.
 
-    Raises InputError for missing or damaged files, sizes that disagree with ``camera.pkl``, counts
-    that differ by more than ``most_surplus``, and a missing body model.
+    Raises InputError for missing and damaged files, links that lead out of the folder, sizes that
+    disagree with ``camera.pkl``, counts that differ by more than ``most_surplus``, and a missing
+    body model.
     """
-    subject = _open(folder)
+    paths = find_paths(folder)
+    require_inside(folder, paths.present, configuration.links)
+    subject = _open(folder, paths)
     usable, remarks = _usable(subject, configuration.most_surplus)
     numbers, origin = choose_clip(
         subject.name, configuration.first_frame, configuration.frames, usable
@@ -123,6 +131,7 @@ def read_people_snapshot(
         license=LICENSE,
         attribution=ATTRIBUTION,
         remarks=(*remarks, rate),
+        behind_person="white" if configuration.background == "white" else "kept",
         working_fps=working_fps,
     )
 
@@ -140,13 +149,12 @@ class _Subject:
     remarks: tuple[str, ...]
 
 
-def _open(folder: Path) -> _Subject:
-    paths = find_paths(folder)
+def _open(folder: Path, paths: SnapshotPaths) -> _Subject:
     camera, remarks = _as_world(read_camera(paths.camera, CAMERA))
     video = decode_to_the_end(paths.video)
-    _require_size(video.width, video.height, camera, paths.video.name)
+    require_size((video.width, video.height), camera.size, paths.video.name)
     masks = Hdf5Masks(paths.masks)
-    _require_size(masks.shape[2], masks.shape[1], camera, paths.masks.name)
+    require_size(masks.shape[:0:-1], camera.size, paths.masks.name)
     tracked = read_tracked_body(paths.poses)
     name = folder.resolve().name
     return _Subject(name, paths, camera, video.frame_count, masks, tracked, remarks)
@@ -157,16 +165,6 @@ def _as_world(camera: Camera) -> tuple[Camera, tuple[str, ...]]:
     apart = max(float(np.abs(camera.R - np.eye(3)).max()), float(np.abs(camera.t).max()))
     moved = ("camera_rt and camera_t are set to 0: poses have them",) if apart > NO_MOTION else ()
     return replace(camera, R=np.eye(3), t=np.zeros(3)), moved
-
-
-def _require_size(width: int, height: int, camera: Camera, what: str) -> None:
-    if (width, height) != (camera.width, camera.height):
-        raise InputError(
-            f"{what} must be {camera.width} x {camera.height} as camera.pkl says",
-            f"{width} x {height}",
-            "It was turned, cropped or resized since: undo that, for example with ffmpeg's "
-            "filters transpose and crop.",
-        )
 
 
 def _usable(subject: _Subject, most_surplus: int) -> tuple[int, list[str]]:
@@ -233,9 +231,6 @@ def _recorded(
     subject: _Subject, numbers: Indices, configuration: PeopleSnapshotConfig
 ) -> DatasetCamera:
     camera, side_px = subject.camera, configuration.mask_erosion_px
-    masks = ChosenMasks(ErodedMasks(subject.masks, side_px) if side_px else subject.masks, numbers)
-    frames = ChosenFrames(VideoFrames(subject.paths.video), numbers)
-    if configuration.background == "filmed":
-        return DatasetCamera(camera, frames, masks)
-    plate = np.full((camera.height, camera.width, 3), WHITE, np.uint8)
-    return DatasetCamera(camera, FramesOnWhite(frames, masks), masks, plate)
+    masks = ErodedMasks(subject.masks, side_px) if side_px else subject.masks
+    video = VideoFrames(subject.paths.video)
+    return DatasetCamera(camera, Chosen(video, numbers, fps=video.fps), Chosen(masks, numbers))

@@ -11,7 +11,7 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.datasets.dataset_scene import MaskSource
-from mocoflow_core.errors import InputError
+from mocoflow_core.datasets.picture_size import require_size
 from mocoflow_core.geometry.camera import Camera
 
 SAMPLED_FRAMES = 9
@@ -56,17 +56,6 @@ def sample_masks(
     view = WorkingView.of(camera, LONGER_SIDE_PX)
     seen = np.empty((len(numbers), view.camera.height, view.camera.width), bool)
     for row, (number, mask) in enumerate(masks.read(numbers.tolist())):
-        require_size(mask, camera, f"mask {number} of {camera.name}")
+        require_size(mask.shape[::-1], camera.size, f"mask {number} of {camera.name}")
         seen[row] = view.mask(mask.astype(np.uint8) * np.uint8(255))
     return SampledMasks(view.camera, numbers, seen)
-
-
-def require_size(picture: NDArray[np.generic], camera: Camera, what: str) -> None:
-    """Raise InputError unless a picture (H, W, ...) has the size that its camera states."""
-    height, width = picture.shape[:2]
-    if (width, height) != (camera.width, camera.height):
-        raise InputError(
-            f"{what} must be {camera.width} x {camera.height} as the calibration says",
-            f"{width} x {height}",
-            "A picture that was turned, cropped or resized needs another calibration.",
-        )

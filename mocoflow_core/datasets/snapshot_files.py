@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.datasets.opencv_calibration import corner_origin, rotation_matrix
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.untrusted import read_hdf5, read_pickle
@@ -23,8 +23,6 @@ KEYPOINTS_FILE = "keypoints.hdf5"
 REQUIRED = ("<folder's name>.mp4", CAMERA_FILE, MASKS_FILE, POSES_FILE)
 VIDEO_ENDINGS = (".mp4", ".mov", ".avi", ".mkv", ".webm")
 JOINTS = 24
-# The calibrations were made with OpenCV, which has pixel centres at integers.
-_CORNER_ORIGIN = 0.5
 _AS_DISTRIBUTED = "Take the file as it was distributed."
 
 
@@ -55,6 +53,12 @@ class SnapshotPaths:
     poses: Path
     consensus: Path | None
     keypoints: Path | None
+
+    @property
+    def present(self) -> list[Path]:
+        """All that there are."""
+        parts = (self.video, self.camera, self.masks, self.poses, self.consensus, self.keypoints)
+        return [part for part in parts if part]
 
 
 def find_paths(folder: Path) -> SnapshotPaths:
@@ -100,13 +104,13 @@ def read_camera(path: Path, name: str) -> Camera:
     turn = _numbers(values, "camera_rt", (3,), path)
     if width < 1 or height < 1:
         raise InputError(f"{path.name} must state a size", f"{width} x {height}", _AS_DISTRIBUTED)
-    cx, cy = centre + _CORNER_ORIGIN
+    K = np.array([[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]])
     return Camera(
         name=name,
         width=width,
         height=height,
-        K=np.array([[focal[0], 0.0, cx], [0.0, focal[1], cy], [0.0, 0.0, 1.0]]),
-        R=np.asarray(cv2.Rodrigues(turn)[0], np.float64),
+        K=corner_origin(K),
+        R=rotation_matrix(turn),
         t=_numbers(values, "camera_t", (3,), path),
         distortion=_numbers(values, "camera_k", (5,), path),
     )

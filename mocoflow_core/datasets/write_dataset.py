@@ -139,6 +139,8 @@ def _describe(scene: DatasetScene, cameras: dict[str, CameraDescription]) -> Sce
         name=scene.name,
         fps=scene.fps,
         **rate,
+        behind_person=scene.behind_person,
+        source_begins_at=scene.source_begins_at,
         world=WorldDescription(unit="m", up=scene.up),
         train_camera=scene.train_camera,
         cameras=cameras,
@@ -153,6 +155,7 @@ def _describe(scene: DatasetScene, cameras: dict[str, CameraDescription]) -> Sce
         truth=TruthDescription(file="truth.npz") if truth else None,
         license=scene.license,
         attribution=scene.attribution,
+        remarks=list(scene.caveats),
     )
 
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from mocoflow_core.capture.frame_source import FrameSource, ImageFrames
-from mocoflow_core.datasets.chosen_frames import WHITE, FramesOnWhite
+from mocoflow_core.capture.frame_source import ImageFrames
 from mocoflow_core.datasets.dataset_scene import DatasetCamera
 from mocoflow_core.datasets.opencv_calibration import corner_origin
 from mocoflow_core.datasets.zju_annotations import ZjuAnnotations, ZjuCalibration
@@ -20,7 +18,6 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 
 Indices = NDArray[np.int32]
-Background = Literal["white", "filmed"]
 # The paper's camera with ID 01, under both namings.
 FIRST_CAMERAS = ("Camera_B1", "Camera_1")
 
@@ -56,7 +53,6 @@ def open_camera(
     name: str,
     wanted: Sequence[int],
     masks: MaskChoice,
-    background: Background,
 ) -> tuple[DatasetCamera | None, tuple[str, ...]]:
     """A camera with those of the wanted frames that there are, and remarks about the others.
 
@@ -74,14 +70,7 @@ def open_camera(
         remarks.append(f"{missing} of {len(wanted)} pictures of {name} are missing")
     if missing := len(images) - len(found.indices):
         remarks.append(f"{missing} of {len(images)} masks of {name} are missing")
-    frames: FrameSource = ImageFrames(images)
-    plate = None
-    if background == "white":
-        if not len(found.indices):
-            return None, (*remarks, f"{name} is left out: nothing says what is not white")
-        frames = FramesOnWhite(frames, found)
-        plate = np.full((camera.height, camera.width, 3), WHITE, np.uint8)
-    return DatasetCamera(camera, frames, found, plate), tuple(remarks)
+    return DatasetCamera(camera, ImageFrames(images), found), tuple(remarks)
 
 
 def _spellings(wanted: str) -> list[str]:

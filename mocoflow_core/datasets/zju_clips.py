@@ -4,29 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import PurePath
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.datasets.clip_range import ClipRange
 from mocoflow_core.errors import InputError
 
 Indices = NDArray[np.int32]
-
-
-@dataclass(frozen=True)
-class ClipRange:
-    """Source frames ``start`` to ``start + length - 1``."""
-
-    start: int
-    length: int
-
-    def among(self, numbers: Indices) -> Indices:
-        return numbers[(numbers >= self.start) & (numbers < self.start + self.length)]
-
-    def __str__(self) -> str:
-        return f"{self.start} to {self.start + self.length - 1}"
 
 
 # Training ranges of Neural Body (configs/zju_mocap_exp); 313 and 315 count from 1. The paper's

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mocoflow_core.datasets.dataset_scene import Mask
+from mocoflow_core.datasets.picture_size import require_size
 from mocoflow_core.errors import InputError
 
 MaskChoice = Literal["union", "mask", "mask_cihp"]
@@ -45,12 +46,7 @@ class LabelMasks:
 
     def _read(self, path: Path) -> Mask:
         mask = read_labels(path)
-        if mask.shape[::-1] != self.size:
-            raise InputError(
-                f"masks of {self.size[0]} x {self.size[1]} pixels like their frames",
-                f"{mask.shape[1]} x {mask.shape[0]} in {path.parent.name}/{path.name}",
-                "Take frames and masks of the same release.",
-            )
+        require_size(mask.shape[::-1], self.size, f"{path.parent.name}/{path.name}")
         return mask
 
 

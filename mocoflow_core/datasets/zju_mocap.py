@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,12 @@ from pydantic import Field
 
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.datasets.camera_up import up_of_cameras
+from mocoflow_core.datasets.caveats import of_multi_view_bodies
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
+from mocoflow_core.datasets.links import LINKS, Links, links_below, require_inside
 from mocoflow_core.datasets.zju_annotations import LengthUnit, ZjuAnnotations, read_annotations
 from mocoflow_core.datasets.zju_bodies import BodyChoice, BodySource, read_bodies
 from mocoflow_core.datasets.zju_cameras import (
-    Background,
     choose_camera,
     open_camera,
     recorded_frames,
@@ -56,13 +58,18 @@ class ZjuMocapConfig(ConfigurationPart):
     masks: MaskChoice = Field(
         "union", description="Folder of masks: mask, mask_cihp, or what either calls a person."
     )
-    background: Background = Field("white", description="What the frames show around the person.")
-    bodies: BodyChoice = Field("best", description="Folder of bodies; best: the first there is.")
+    background: Literal["white", "filmed"] = Field(
+        "white",
+        description="White: what a reconstruction sets the person before; the scene's frames are "
+        "as filmed.",
+    )
+    bodies: BodyChoice = Field("best", description="Folder of bodies; best: of most frames.")
     body_number_offset: int = Field(0, description="Number of a body file less its picture's.")
     faces: Path | None = Field(None, description="Mesh file with the faces of SMPL.")
     body_model: Path | None = Field(None, description="SMPL model file, or the folder it is in.")
     camera_unit: LengthUnit = Field("millimetres", description="Unit of T in annots.npy.")
     up: Up | None = Field(None, description="Up of the world; null: as the cameras stand.")
+    links: Links = Field("inside", description=LINKS)
 
 
 def read_zju_mocap(
@@ -71,16 +78,19 @@ def read_zju_mocap(
 ) -> DatasetScene:
     """One subject's folder (``CoreView_377``) as a scene. Pictures are read when written.
 
-    Raises InputError for another layout, and for missing calibrations, pictures, masks, bodies.
+    Raises InputError for links that lead out of the folder, another layout, and for missing
+    calibrations, pictures, masks, bodies.
     """
+    require_inside(source, links_below(source), configuration.links)
     annotations = read_annotations(source, configuration.camera_unit)
     train = choose_camera(annotations, configuration.train_camera)
     subject = subject_of([source.resolve().name, *annotations.pictures[train].values()])
-    clip, clip_remarks = _clip(source, annotations, train, subject, configuration)
+    pictures, masked = recorded_frames(source, annotations, train, configuration.masks)
+    clip, clip_remarks = _clip(pictures, masked, subject, configuration)
     meshes, body_remarks = read_bodies(source, clip, _body_source(configuration))
     clip, trim_remarks = _with_bodies(clip, meshes)
     cameras, camera_remarks = _cameras(source, annotations, train, clip, configuration)
-    up, up_remarks = _up(cameras, configuration)
+    up, up_remarks = _up(annotations, configuration)
     rate_remark = (
         f"the true rate is not known: the source counts as {configuration.fps:g} per second, "
         f"one frame in {configuration.stride} is learned from"
@@ -99,19 +109,17 @@ def read_zju_mocap(
             *(rate_remark, *clip_remarks, *body_remarks, *trim_remarks, *camera_remarks),
             *up_remarks,
         ),
+        behind_person="white" if configuration.background == "white" else "kept",
+        caveats=of_multi_view_bodies(meshes),
+        source_begins_at=int(pictures[0]),
         working_fps=configuration.fps / configuration.stride,
     )
 
 
 def _clip(
-    folder: Path,
-    annotations: ZjuAnnotations,
-    train: str,
-    subject: str | None,
-    configuration: ZjuMocapConfig,
+    pictures: Indices, masked: Indices, subject: str | None, configuration: ZjuMocapConfig
 ) -> tuple[Indices, tuple[str, ...]]:
     wanted = chosen_range(subject, configuration.first_frame, configuration.frames)
-    pictures, masked = recorded_frames(folder, annotations, train, configuration.masks)
     clip, remarks = unbroken_clip(wanted, pictures, masked)
     return clip, (*remarks, *bad_masks(subject, clip))
 
@@ -160,7 +168,6 @@ def _cameras(
             name,
             clip[::every].tolist(),
             configuration.masks,
-            configuration.background,
         )
         remarks += said
         if camera:
@@ -168,10 +175,8 @@ def _cameras(
     return cameras, tuple(remarks)
 
 
-def _up(
-    cameras: dict[str, DatasetCamera], configuration: ZjuMocapConfig
-) -> tuple[Up, tuple[str, ...]]:
+def _up(annotations: ZjuAnnotations, configuration: ZjuMocapConfig) -> tuple[Up, tuple[str, ...]]:
     if configuration.up:
         return configuration.up, (f"up is {configuration.up}, as asked for",)
-    up, remark = up_of_cameras((part.camera for part in cameras.values()), EXPECTED_UP)
+    up, remark = up_of_cameras((one.R for one in annotations.calibrations.values()), EXPECTED_UP)
     return up, (remark,)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from mocoflow_core.body.blend_skinning import posed_vertices
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.stored import Stored, read_stored
+from mocoflow_core.estimators.estimate_file import EstimateFile, read_stored
 
 TOOL = "AIST++ motion"
 PARTS = {"smpl_poses", "smpl_trans", "smpl_scaling"}
@@ -59,15 +59,15 @@ def motion_vertices(
     return (METRES * placed_cm).astype(np.float32)
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """A dictionary with poses, translations and a scaling."""
     return isinstance(stored.content, Mapping) and set(stored.content) >= PARTS
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """The dancer in the world of the cameras' files, metres. Raises InputError without SMPL."""
     motion = _motion(stored.content, stored.path.name)
-    model = known.require_model(TOOL, "SMPL")
+    model = context.require_model(TOOL, "SMPL")
     return BodyEstimate(
         source=TOOL,
         frame_indices=np.arange(len(motion), dtype=np.int32),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mocoflow_core.body.blend_skinning import posed_vertices
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.errors import InputError
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.placement import middles
 
 Array = NDArray[np.float64]
@@ -30,9 +30,9 @@ class Bodies:
     remarks: tuple[str, ...] = ()
 
 
-def shapes_of(betas: Array, known: Known) -> tuple[Array, tuple[str, ...]]:
+def shapes_of(betas: Array, context: EstimateContext) -> tuple[Array, tuple[str, ...]]:
     """The shape (S,) of the person, or one per frame (T, S), as chosen."""
-    if known.chosen.shape == "per_frame":
+    if context.chosen.shape == "per_frame":
         return betas, ()
     wobble = float(np.ptp(betas, axis=0).max(initial=0.0))
     if wobble == 0:
@@ -43,35 +43,35 @@ def shapes_of(betas: Array, known: Known) -> tuple[Array, tuple[str, ...]]:
 
 
 def modelled(
-    tool: str, pose: Array, betas: Array, known: Known, translation: Array | None = None
+    tool: str, pose: Array, betas: Array, context: EstimateContext, translation: Array | None = None
 ) -> Bodies:
     """Bodies posed with the user's SMPL model; pose (T, 24, 3) or matrices (T, 24, 3, 3).
 
     Raises InputError without the model.
     """
-    model = known.require_model(tool, "SMPL")
-    shape, remarks = shapes_of(_fitting(betas, model), known)
+    model = context.require_model(tool, "SMPL")
+    shape, remarks = shapes_of(fitting_shapes(betas, model), context)
     vertices = posed_vertices(model, pose, shape, translation)
     return Bodies(vertices.astype(np.float32), model.faces.astype(np.int32), remarks)
 
 
 def stored(
-    tool: str, vertices: Array, pose: Array | None, betas: Array | None, known: Known
+    tool: str, vertices: Array, pose: Array | None, betas: Array | None, context: EstimateContext
 ) -> Bodies:
     """A tool's own vertices; with a body model at hand, of one shape and where they stood.
 
     Raises InputError without faces.
     """
-    faces = known.faces(tool, vertices.shape[1])
+    faces = context.faces(tool, vertices.shape[1])
     own = Bodies(vertices.astype(np.float32), faces)
-    model = known.model
+    model = context.model
     whole = model is not None and len(model.parents) == 24
-    if known.chosen.shape == "per_frame" or pose is None or betas is None:
+    if context.chosen.shape == "per_frame" or pose is None or betas is None:
         return own
     if not whole or model is None:
         note = "body shapes vary as the estimate's do: one shape for all needs --body-model"
         return Bodies(own.vertices, faces, (note,) if np.ptp(betas, axis=0).any() else ())
-    betas = _fitting(betas, model)
+    betas = fitting_shapes(betas, model)
     off_m = _difference_m(model, vertices, pose, betas)
     if off_m > SAME_BODY_M:
         note = (
@@ -79,7 +79,7 @@ def stored(
             "(another gender or version?): the estimate's are kept, shapes as they vary"
         )
         return Bodies(own.vertices, faces, (note,))
-    shape, remarks = shapes_of(betas, known)
+    shape, remarks = shapes_of(betas, context)
     if shape.ndim == 1 and not remarks:
         return own
     bodies = posed_vertices(model, pose, shape)
@@ -95,8 +95,8 @@ def _difference_m(model: SmplModel, vertices: Array, pose: Array, betas: Array) 
     return float(np.linalg.norm(apart, axis=-1).max())
 
 
-def _fitting(betas: Array, model: SmplModel) -> Array:
-    """The coefficients that the model has directions for."""
+def fitting_shapes(betas: Array, model: SmplModel) -> Array:
+    """The coefficients; raises InputError where the model has no directions for some."""
     known = model.shape_directions.shape[-1]
     if betas.shape[-1] > known:
         raise InputError(

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from mocoflow_core.body.ingest import FileCoordinates
+from mocoflow_core.capture.scene_description import Coordinates
 from mocoflow_core.configuration import ConfigurationPart
 
 Kind = Literal[
@@ -31,7 +31,8 @@ class EstimateConfig(ConfigurationPart):
     kind: Kind | Literal["auto"] = Field("auto", description="Tool; auto: told by the content.")
     person: int | None = Field(None, description="Id of the person; null: the longest track.")
     body_model: Path | None = Field(
-        None, description="SMPL or SMPL-X model file of the user's: .pkl or .npz."
+        None,
+        description="SMPL or SMPL-X of the user's: a .pkl or .npz file, or a folder of them.",
     )
     faces: Path | None = Field(
         None, description="Mesh file whose faces the estimate shares, where no model is at hand."
@@ -54,7 +55,7 @@ class EstimateConfig(ConfigurationPart):
     pose_blend_shapes: Literal["on", "off"] = Field(
         "on", description="Off for bodies fitted without them: Neural Body's old params."
     )
-    coordinates: FileCoordinates | None = Field(
+    coordinates: Coordinates | None = Field(
         None, description="Where the meshes of a folder stand; null: what scene.json says."
     )
 

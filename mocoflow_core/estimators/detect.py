@@ -6,20 +6,15 @@ from collections.abc import Mapping
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import Kind
+from mocoflow_core.estimators.estimate_file import EstimateFile, what_is_in
 from mocoflow_core.estimators.readers import READERS
-from mocoflow_core.estimators.stored import Stored, what_is_in
-
-NATIVE_SUFFIX = ".npz"
 
 
-def detect(stored: Stored) -> Kind:
+def detect(stored: EstimateFile) -> Kind:
     """The kind whose layout the content has.
 
     Raises InputError where it has none or several, with what was found and the kinds there are.
     """
-    if not stored.is_folder and stored.path.suffix == NATIVE_SUFFIX and _is_no_result(stored):
-        # Whatever is wrong with such a file, the native reader says it best.
-        return "native"
     found = [kind for kind, reader in READERS.items() if reader.recognises(stored)]
     if len(found) == 1:
         return found[0]
@@ -37,15 +32,7 @@ def detect(stored: Stored) -> Kind:
     )
 
 
-def _is_no_result(stored: Stored) -> bool:
-    try:
-        content = stored.content
-    except InputError:
-        return True
-    return not (isinstance(content, Mapping) and "results" in content)
-
-
-def _advice(stored: Stored) -> str:
+def _advice(stored: EstimateFile) -> str:
     """Files that are often taken for the right ones."""
     content = stored.content
     first = next(iter(content.values()), None) if isinstance(content, Mapping) else None

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.body.ingest import FileCoordinates
+from mocoflow_core.capture.scene_description import Coordinates
 
 Numbering = Literal["position", "source"]
 
@@ -30,7 +30,7 @@ class BodyEstimate:
     numbering: Numbering
     vertices: NDArray[np.float32]  # (T, V, 3)
     faces: NDArray[np.int32]  # (F, 3)
-    coordinates: FileCoordinates
+    coordinates: Coordinates
     located: bool
     first_translations: NDArray[np.float64] | None = None  # (T, 3)
     keypoint_regressor: NDArray[np.float32] | None = None  # (17, V)

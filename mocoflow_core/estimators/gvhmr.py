@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from mocoflow_core.body.blend_skinning import posed_vertices
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.bodies import shapes_of
+from mocoflow_core.estimators.context import JOINTS, EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import MODELS, Known
+from mocoflow_core.estimators.estimate_file import EstimateFile
 from mocoflow_core.estimators.placement import ToolCamera, placed
-from mocoflow_core.estimators.stored import Stored
 from mocoflow_core.estimators.tracks import Track, choose_track, row_arrays
 
 TOOL = "GVHMR"
@@ -25,21 +25,23 @@ BODY_JOINTS = 21
 IN_CAMERA = "smpl_params_incam"
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """A dictionary with parameters in the camera's axes."""
     return isinstance(stored.content, Mapping) and IN_CAMERA in stored.content
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """The person, in the camera's axes for its intrinsics.
 
     Raises InputError without the SMPL-X model.
     """
-    track, _ = choose_track([_track(stored)], known.chosen.person)
-    model = known.require_model(TOOL, "SMPL-X")
-    shape, remarks = shapes_of(track.rows("betas"), known)
+    track, _ = choose_track([_track(stored)], context.chosen.person)
+    model = context.require_model(TOOL, "SMPL-X")
+    shape, remarks = shapes_of(track.rows("betas"), context)
     bodies = posed_vertices(model, _pose(track), shape, track.floats("transl", 3))
-    vertices, refocus = placed(TOOL, bodies.astype(np.float32), _camera(track, known), known.camera)
+    vertices, refocus = placed(
+        TOOL, bodies.astype(np.float32), _camera(track, context), context.camera
+    )
     return BodyEstimate(
         source=TOOL,
         frame_indices=track.frame_indices,
@@ -52,7 +54,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
     )
 
 
-def _track(stored: Stored) -> Track:
+def _track(stored: EstimateFile) -> Track:
     content = stored.content
     record = content.get(IN_CAMERA) if isinstance(content, Mapping) else None
     if not isinstance(content, Mapping) or not isinstance(record, Mapping):
@@ -69,17 +71,17 @@ def _track(stored: Stored) -> Track:
 
 def _pose(track: Track) -> NDArray[np.float64]:
     """Axis-angle (T, 55, 3): root and body; jaw, eyes and hands at rest."""
-    pose = np.zeros((len(track), MODELS["SMPL-X"][0], 3))
+    pose = np.zeros((len(track), JOINTS["SMPL-X"], 3))
     pose[:, :1] = track.floats("global_orient", 1, 3)
     pose[:, 1 : 1 + BODY_JOINTS] = track.floats("body_pose", BODY_JOINTS, 3)
     return pose
 
 
-def _camera(track: Track, known: Known) -> ToolCamera:
+def _camera(track: Track, context: EstimateContext) -> ToolCamera:
     """Its intrinsics, in pixels of the scene's pictures; those of the diagonal without any."""
     if "K_fullimg" not in track.arrays:
-        return ToolCamera.of_diagonal(known.camera, known.chosen.focal_px)
+        return ToolCamera.of_diagonal(context.camera, context.chosen.focal_px)
     K = track.floats("K_fullimg", 3, 3)
-    scale = known.camera.width / (2 * K[:, 0, 2])
-    focal_px = known.chosen.focal_px or K[:, 0, 0]
+    scale = context.camera.width / (2 * K[:, 0, 2])
+    focal_px = context.chosen.focal_px or K[:, 0, 0]
     return ToolCamera(scale * focal_px, scale[:, None] * K[:, :2, 2])

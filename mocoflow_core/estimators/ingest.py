@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mocoflow_core.body.ingest import IngestedMeshes, ingest_sequence
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
 from mocoflow_core.estimators.read import read_estimate
 
 
@@ -36,11 +38,13 @@ def ingest_meshes(
             "none" if path is None else f"no file {path}",
             "Name a mesh file in scene.json, or give one with --meshes.",
         )
-    known = Known(scene.cameras[scene.train_camera], chosen, scene.description.meshes)
-    estimate = read_estimate(path, known)
+    context = EstimateContext(scene.cameras[scene.train_camera], chosen, scene.description.meshes)
+    estimate = _numbered(read_estimate(path, context), scene)
     return ingest_sequence(
         scene,
-        _sequence(estimate, scene),
+        MeshSequence(
+            estimate.frame_indices, estimate.vertices, estimate.faces, estimate.keypoint_regressor
+        ),
         estimate.coordinates,
         estimate.located,
         is_scenes_own=path == scene.meshes(),
@@ -49,11 +53,42 @@ def ingest_meshes(
     )
 
 
-def _sequence(estimate: BodyEstimate, scene: Scene) -> MeshSequence:
-    """With source numbers: positions count from the first frame of the video."""
-    numbers = estimate.frame_indices
+def _numbered(estimate: BodyEstimate, scene: Scene) -> BodyEstimate:
+    """With source numbers; without what belongs to the source and not to the clip cut out of it.
+
+    Positions count from the first frame that the tool was given: the source's.
+    """
+    clip = scene.frames(scene.train_camera).indices
+    begins_at = scene.description.source_begins_at
     if estimate.numbering == "position":
-        numbers = numbers + scene.frames(scene.train_camera).indices[0]
-    return MeshSequence(
-        numbers.astype(np.int32), estimate.vertices, estimate.faces, estimate.keypoint_regressor
+        first = clip[0] if begins_at is None else begins_at
+        numbers = (estimate.frame_indices + first).astype(np.int32)
+        estimate = replace(estimate, frame_indices=numbers, numbering="source")
+    return estimate if begins_at is None else _cut_to(estimate, clip)
+
+
+def _cut_to(estimate: BodyEstimate, clip: NDArray[np.int32]) -> BodyEstimate:
+    """The rows from the clip's first to its last frame. Raises InputError where there is none."""
+    numbers = estimate.frame_indices
+    inside = (numbers >= clip[0]) & (numbers <= clip[-1])
+    if inside.all() or len(inside) != len(estimate.vertices):
+        return estimate
+    held = f"frames {numbers.min()} to {numbers.max()} of the source"
+    if not inside.any():
+        raise InputError(
+            f"meshes of the clip's frames {clip[0]} to {clip[-1]}",
+            held,
+            "If the tool was given the clip alone, say how many frames of the source come before "
+            "it with --set meshes.first_frame=N.",
+        )
+    first = estimate.first_translations
+    return replace(
+        estimate,
+        frame_indices=numbers[inside],
+        vertices=estimate.vertices[inside],
+        first_translations=None if first is None else first[inside],
+        remarks=(
+            *estimate.remarks,
+            f"the estimate holds {held}: those of the clip, {clip[0]} to {clip[-1]}, are used",
+        ),
     )

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from mocoflow_core.body.mesh_file import MESH_SUFFIXES, read_mesh
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.mesh_file import MESH_SUFFIXES, read_mesh
-from mocoflow_core.estimators.stored import Stored, frame_numbers
+from mocoflow_core.estimators.estimate_file import EstimateFile, frame_numbers
 
 TOOL = "meshes"
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """A folder with mesh files."""
     return stored.is_folder and bool(stored.files(*MESH_SUFFIXES))
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """The meshes, metres, where the setting or the scene's description says.
 
     Raises InputError for a single file, for meshes of another topology than the first one, and
@@ -45,8 +45,8 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
             )
         bodies.append(others)
     order = np.argsort(numbers)
-    described = known.described
-    coordinates = known.chosen.coordinates or (described.coordinates if described else "camera")
+    described = context.described
+    coordinates = context.chosen.coordinates or (described.coordinates if described else "camera")
     return BodyEstimate(
         source=TOOL,
         frame_indices=numbers[order],

@@ -6,14 +6,14 @@ Layout: mkocabas/PARE, pare/core/tester.py.
 from __future__ import annotations
 
 from mocoflow_core.estimators import vibe
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.stored import Stored, people_of
+from mocoflow_core.estimators.estimate_file import EstimateFile, people_of
 
 CROP_FACTOR = 1.0
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """Records with a weak perspective camera and rotation matrices or PARE's keypoints."""
     people = people_of(stored.content)
     return bool(people) and all(
@@ -21,6 +21,6 @@ def recognises(stored: Stored) -> bool:
     )
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person of PARE's output. Raises InputError without faces."""
-    return vibe.read_cropped("PARE", CROP_FACTOR, stored, known)
+    return vibe.read_cropped("PARE", CROP_FACTOR, stored, context)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.bodies import modelled
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.estimate_file import EstimateFile, frame_numbers
 from mocoflow_core.estimators.placement import ToolCamera, middles, refocused, where_known
-from mocoflow_core.estimators.stored import Stored, frame_numbers
 from mocoflow_core.estimators.tracks import Track, choose_track
 
 TOOL = "PHALP"
@@ -28,27 +28,27 @@ FOCAL_PX, NETWORK_SIDE_PX = 5000.0, 256.0
 PARTS = ("tid", "tracked_time", "smpl", "camera", "size")
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """A dictionary of frames with parallel lists of tracks."""
     return any("smpl" in frame and "tid" in frame for frame in _frames(stored.content).values())
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person, root-centred, with its place as the long camera says it.
 
     Raises InputError without the SMPL model, and for a list of boxes without bodies.
     """
     tracks, ghosts = _tracks(_frames(stored.content))
-    track, chosen = choose_track(tracks, known.chosen.person)
+    track, chosen = choose_track(tracks, context.chosen.person)
     pose = np.concatenate(
         [track.floats("global_orient", 1, 3, 3), track.floats("body_pose", 23, 3, 3)], axis=1
     )
-    bodies = modelled(TOOL, pose, track.rows("betas"), known)
+    bodies = modelled(TOOL, pose, track.rows("betas"), context)
     translations = refocused(
         track.floats("camera", 3),
         middles(bodies.vertices),
-        _camera(track.floats("size", 2), known),
-        known.camera,
+        _camera(track.floats("size", 2), context),
+        context.camera,
     )
     left_out = (f"{ghosts} entries that PHALP only predicted are left out",) if ghosts else ()
     return BodyEstimate(
@@ -115,8 +115,8 @@ def _positions(frames: dict[str, Mapping[str, Any]]) -> dict[str, int]:
     return dict(zip(frames, (number - min(numbers) for number in numbers), strict=True))
 
 
-def _camera(sizes: NDArray[np.float64], known: Known) -> ToolCamera:
+def _camera(sizes: NDArray[np.float64], context: EstimateContext) -> ToolCamera:
     """The tool's camera in pixels of the scene's pictures; sizes (n, 2) are height, width."""
-    scale = known.camera.width / sizes[:, 1]
-    focal_px = scale * (known.chosen.focal_px or FOCAL_PX / NETWORK_SIDE_PX * sizes.max(axis=1))
+    scale = context.camera.width / sizes[:, 1]
+    focal_px = scale * (context.chosen.focal_px or FOCAL_PX / NETWORK_SIDE_PX * sizes.max(axis=1))
     return ToolCamera(focal_px, scale[:, None] * sizes[:, ::-1] / 2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,41 +11,57 @@ import numpy as np
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig, Kind
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.detect import detect
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.estimate_file import EstimateFile
 from mocoflow_core.estimators.readers import READERS
-from mocoflow_core.estimators.stored import Stored
 
 # Read by all kinds, or by whoever has a use for them: files lie ready for several scenes.
 _ALWAYS = {"kind", "body_model", "faces"}
 
 
-def read_estimate(path: Path, known: Known) -> BodyEstimate:
+def read_estimate(path: Path, context: EstimateContext) -> BodyEstimate:
     """The bodies that a tool's file or folder holds, for one person.
 
     Raises InputError for unknown or damaged content, for a person who is not in it, for a body
     model that is needed and not given, and for settings that its kind does not read.
     """
-    stored = Stored(path)
-    kind = detect(stored) if known.chosen.kind == "auto" else known.chosen.kind
-    _require_read(known.chosen, kind)
+    stored = EstimateFile(path)
+    kind = kind_of(stored, context.chosen)
+    _require_read(context.chosen, kind)
+    with (
+        _as_written_by(READERS[kind].title, path),
+        np.errstate(divide="ignore", invalid="ignore", over="ignore"),
+    ):
+        estimate = READERS[kind].read(stored, context)
+    if not context.chosen.first_frame:
+        return estimate
+    later = (estimate.frame_indices + context.chosen.first_frame).astype(np.int32)
+    return replace(estimate, frame_indices=later)
+
+
+def kind_of(stored: EstimateFile, chosen: EstimateConfig) -> Kind:
+    """The kind that was chosen, else the one told by the content. Raises InputError as it does."""
+    if chosen.kind != "auto":
+        return chosen.kind
+    with _as_written_by("one of the known tools", stored.path):
+        return detect(stored)
+
+
+@contextmanager
+def _as_written_by(tool: str, path: Path) -> Iterator[None]:
+    """Arrays of another size, type or nesting than the tool's: bad input, whatever they cause."""
     try:
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            estimate = READERS[kind].read(stored, known)
+        yield
     except InputError:
         raise
-    # Whatever arrays of another size, type or nesting than the tool's lead to.
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError(
-            f"an estimate as {READERS[kind].title} writes it",
+            f"an estimate as {tool} writes it",
             f"other arrays in {path.name} ({type(error).__name__}: {str(error).splitlines()[:1]})",
             "Write the estimate again.",
         ) from error
-    if not known.chosen.first_frame:
-        return estimate
-    later = (estimate.frame_indices + known.chosen.first_frame).astype(np.int32)
-    return replace(estimate, frame_indices=later)
 
 
 def _require_read(chosen: EstimateConfig, kind: Kind) -> None:

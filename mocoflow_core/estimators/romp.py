@@ -17,9 +17,9 @@ from mocoflow_core.body.blend_skinning import posed_joints
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators import bodies
 from mocoflow_core.estimators.bodies import Bodies
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
-from mocoflow_core.estimators.people_in_time import follow_people
+from mocoflow_core.estimators.estimate_file import EstimateFile, frame_numbers, read_stored
 from mocoflow_core.estimators.placement import (
     ToolCamera,
     middle,
@@ -28,7 +28,7 @@ from mocoflow_core.estimators.placement import (
     weak_translations,
     where_known,
 )
-from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
+from mocoflow_core.estimators.track_association import follow_people
 from mocoflow_core.estimators.tracks import Track, choose_track
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ BEV_BETAS = 11
 CHILD = 0.1  # of the child's share, above which a body without it is another one
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """Results of a frame, of a video, or a folder with a file per frame."""
     if stored.is_folder:
         files = stored.files(".npz")
@@ -49,13 +49,13 @@ def recognises(stored: Stored) -> bool:
     return _is_result(stored.content)
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person, root-centred, with its place as the camera says it. Raises InputError without
     faces, or without the SMPL model where there are no vertices."""
-    track, chosen = choose_track(_tracks(_frames(stored)), known.chosen.person)
+    track, chosen = choose_track(_tracks(_frames(stored)), context.chosen.person)
     is_bev = track.arrays["smpl_betas"].shape[-1] == BEV_BETAS
     tool = "BEV" if is_bev else "ROMP"
-    found = _bodies(tool, track, known)
+    found = _bodies(tool, track, context)
     anchors = middles(found.vertices)
     place = _bev_translations if is_bev else _romp_translations
     return BodyEstimate(
@@ -66,7 +66,7 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
         faces=found.faces,
         coordinates="camera-root-centred",
         located=False,
-        first_translations=where_known(place(track, anchors, known)),
+        first_translations=where_known(place(track, anchors, context)),
         remarks=(*chosen, *found.remarks),
     )
 
@@ -79,7 +79,7 @@ def _is_result(content: object) -> bool:
     return "cam" in results or (isinstance(first, Mapping) and "cam" in first)
 
 
-def _frames(stored: Stored) -> dict[int, People]:
+def _frames(stored: EstimateFile) -> dict[int, People]:
     """People by frame number: what files and pictures are named by."""
     if stored.is_folder:
         contents = {file.name: read_stored(file) for file in stored.files(".npz")}
@@ -138,42 +138,42 @@ def _track(
     return Track(person, frames, arrays, remarks=remarks)
 
 
-def _bodies(tool: str, track: Track, known: Known) -> Bodies:
+def _bodies(tool: str, track: Track, context: EstimateContext) -> Bodies:
     betas = track.rows("smpl_betas")
     child = float(np.abs(betas[:, 10:]).max(initial=0.0))
     pose = track.rotations("smpl_thetas", 24) if "smpl_thetas" in track.arrays else None
     if "verts" in track.arrays:
         # A child's body is no SMPL body: it stays as it is.
         own_pose = None if child > CHILD else pose
-        return bodies.stored(tool, track.bodies("verts"), own_pose, betas[:, :10], known)
-    found = bodies.modelled(tool, track.rotations("smpl_thetas", 24), betas[:, :10], known)
+        return bodies.stored(tool, track.bodies("verts"), own_pose, betas[:, :10], context)
+    found = bodies.modelled(tool, track.rotations("smpl_thetas", 24), betas[:, :10], context)
     if betas.shape[-1] != BEV_BETAS:
         return found
     remarks = found.remarks
     if child > CHILD:
         remarks = (*remarks, f"the child's share of the shape, {child:.2f}, is left out")
     # BEV measures from the middle between both hips.
-    model = known.require_model(tool, "SMPL")
+    model = context.require_model(tool, "SMPL")
     joints = posed_joints(model, track.rotations("smpl_thetas", 24), np.median(betas, 0)[:10])
     hips = joints[:, 1:3].mean(axis=1, keepdims=True)
     return Bodies((found.vertices - hips).astype(np.float32), found.faces, remarks)
 
 
-def _romp_translations(track: Track, anchors: Array, known: Known) -> Array:
+def _romp_translations(track: Track, anchors: Array, context: EstimateContext) -> Array:
     """Exact from the weak perspective camera that ROMP projects with: ``u = s X + tx``."""
-    half_px = max(known.camera.width, known.camera.height) / 2
+    half_px = max(context.camera.width, context.camera.height) / 2
     cam = track.floats("cam", 3)
-    origin_px = middle(known.camera) + half_px * cam[:, 1:]
-    return weak_translations(half_px * cam[:, 0], origin_px, anchors, known.camera)
+    origin_px = middle(context.camera) + half_px * cam[:, 1:]
+    return weak_translations(half_px * cam[:, 0], origin_px, anchors, context.camera)
 
 
-def _bev_translations(track: Track, anchors: Array, known: Known) -> Array:
+def _bev_translations(track: Track, anchors: Array, context: EstimateContext) -> Array:
     """From BEV's perspective camera; where it is missing, from ``s, ty, tx``."""
-    half_px = max(known.camera.width, known.camera.height) / 2
-    made_for = ToolCamera(half_px / HALF_VIEW, middle(known.camera))
+    half_px = max(context.camera.width, context.camera.height) / 2
+    made_for = ToolCamera(half_px / HALF_VIEW, middle(context.camera))
     if "cam_trans" in track.arrays:
-        return refocused(track.floats("cam_trans", 3), anchors, made_for, known.camera)
+        return refocused(track.floats("cam_trans", 3), anchors, made_for, context.camera)
     cam = track.floats("cam", 3)
     depth = 1 / (cam[:, 0] * HALF_VIEW + 1e-3)
     lateral = cam[:, :0:-1] * (depth * HALF_VIEW)[:, None]
-    return refocused(np.column_stack([lateral, depth]), anchors, made_for, known.camera)
+    return refocused(np.column_stack([lateral, depth]), anchors, made_for, context.camera)

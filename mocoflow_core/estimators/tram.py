@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.bodies import modelled
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.estimate_file import EstimateFile, frame_numbers, read_stored
 from mocoflow_core.estimators.placement import ToolCamera, placed
-from mocoflow_core.estimators.stored import Stored, frame_numbers, read_stored
 from mocoflow_core.estimators.tracks import Arrays, Track, choose_track, frames_of, row_arrays
 
 TOOL = "TRAM"
@@ -29,25 +29,25 @@ SAME_WIDTH = 0.05
 STILL_DEG = 1.0
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """A dictionary of a track, or a folder with tracks below ``hps``."""
     if stored.is_folder:
         return bool(_track_files(stored))
     return isinstance(stored.content, Mapping) and set(stored.content) >= PARTS
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person, in the camera's axes for its intrinsics. Raises InputError without the model."""
-    track, chosen = choose_track(_tracks(stored), known.chosen.person)
+    track, chosen = choose_track(_tracks(stored), context.chosen.person)
     bodies = modelled(
         TOOL,
         track.floats("pred_rotmat", 24, 3, 3),
         track.rows("pred_shape"),
-        known,
+        context,
         track.floats("pred_trans", 3),
     )
-    made_for, assumed = _camera(track, known)
-    vertices, refocus = placed(TOOL, bodies.vertices, made_for, known.camera)
+    made_for, assumed = _camera(track, context)
+    vertices, refocus = placed(TOOL, bodies.vertices, made_for, context.camera)
     return BodyEstimate(
         source=TOOL,
         frame_indices=track.frame_indices,
@@ -60,12 +60,12 @@ def read(stored: Stored, known: Known) -> BodyEstimate:
     )
 
 
-def _track_files(stored: Stored) -> list[Path]:
+def _track_files(stored: EstimateFile) -> list[Path]:
     inside = [*stored.files(".npy"), *stored.files(".npy", below="hps")]
     return [file for file in inside if file.name.startswith("hps_track_")]
 
 
-def _tracks(stored: Stored) -> list[Track]:
+def _tracks(stored: EstimateFile) -> list[Track]:
     if not stored.is_folder:
         return [_track(None, stored.content, {})]
     camera = stored.path / "camera.npy"
@@ -94,9 +94,9 @@ def _constants(content: object) -> Arrays:
     return {name: np.asarray(content[name]) for name in CAMERA if name in content}
 
 
-def _camera(track: Track, known: Known) -> tuple[ToolCamera, tuple[str, ...]]:
+def _camera(track: Track, context: EstimateContext) -> tuple[ToolCamera, tuple[str, ...]]:
     """TRAM's camera in pixels of the scene's pictures."""
-    camera, focal_px = known.camera, known.chosen.focal_px
+    camera, focal_px = context.camera, context.chosen.focal_px
     stored = track.constants.get("img_focal")
     if stored is not None:
         focal_px = focal_px or float(np.ravel(stored)[0])

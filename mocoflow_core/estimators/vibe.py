@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from mocoflow_core.estimators.bodies import Bodies, modelled
 from mocoflow_core.estimators.bodies import stored as own_bodies
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.estimate_file import EstimateFile, people_of
 from mocoflow_core.estimators.placement import (
     box_placement,
     middle,
@@ -22,7 +23,6 @@ from mocoflow_core.estimators.placement import (
     weak_translations,
     where_known,
 )
-from mocoflow_core.estimators.stored import Stored, people_of
 from mocoflow_core.estimators.tracks import Track, choose_track, frames_of, row_arrays
 from mocoflow_core.geometry.camera import Camera
 
@@ -34,7 +34,7 @@ CROP_FACTOR = 1.1
 SAME_WIDTH = 0.005
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """Records with a weak perspective camera, pose as axis-angle."""
     people = people_of(stored.content)
     return bool(people) and all(
@@ -52,18 +52,20 @@ def has_matrices(record: Mapping[str, object]) -> bool:
     return "smpl_joints2d" in record or np.ndim(record.get("pose")) >= 3  # type: ignore[arg-type]
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person of ``vibe_output.pkl``. Raises InputError without faces."""
-    return read_cropped("VIBE", CROP_FACTOR, stored, known)
+    return read_cropped("VIBE", CROP_FACTOR, stored, context)
 
 
-def read_cropped(tool: str, factor: float, stored: Stored, known: Known) -> BodyEstimate:
+def read_cropped(
+    tool: str, factor: float, stored: EstimateFile, context: EstimateContext
+) -> BodyEstimate:
     """One person of a file in VIBE's layout, whose network saw ``factor`` times its boxes."""
     tracks = [_track(person, record) for person, record in people_of(stored.content).items()]
-    track, chosen = choose_track(tracks, known.chosen.person)
-    bodies = _bodies(tool, track, known)
+    track, chosen = choose_track(tracks, context.chosen.person)
+    bodies = _bodies(tool, track, context)
     translations, placed = _translations(
-        track, middles(bodies.vertices), known.chosen.crop_factor or factor, known.camera
+        track, middles(bodies.vertices), context.chosen.crop_factor or factor, context.camera
     )
     return BodyEstimate(
         source=tool,
@@ -74,7 +76,17 @@ def read_cropped(tool: str, factor: float, stored: Stored, known: Known) -> Body
         coordinates="camera-root-centred",
         located=False,
         first_translations=None if translations is None else where_known(translations),
-        remarks=(*chosen, *bodies.remarks, *placed),
+        remarks=(*chosen, *bodies.remarks, *placed, *_followed_poses(tool, track)),
+    )
+
+
+def _followed_poses(tool: str, track: Track) -> tuple[str, ...]:
+    """A remark where people were followed by 2-D poses: their boxes come from another routine."""
+    if "joints2d" not in track.arrays:
+        return ()
+    return (
+        f"{tool} followed 2-D poses, whose boxes another routine makes: compare the bodies with "
+        "the silhouettes, and set meshes.crop_factor where they are too large or too small",
     )
 
 
@@ -83,13 +95,13 @@ def _track(person: int, record: Mapping[str, object]) -> Track:
     return Track(person, frames, row_arrays(record, len(frames), "frame_ids"))
 
 
-def _bodies(tool: str, track: Track, known: Known) -> Bodies:
+def _bodies(tool: str, track: Track, context: EstimateContext) -> Bodies:
     pose = betas = None
     if {"pose", "betas"} <= set(track.arrays):
         pose, betas = track.rotations("pose", 24), track.rows("betas")
         if "verts" not in track.arrays:
-            return modelled(tool, pose, betas, known)
-    return own_bodies(tool, track.bodies("verts"), pose, betas, known)
+            return modelled(tool, pose, betas, context)
+    return own_bodies(tool, track.bodies("verts"), pose, betas, context)
 
 
 def _translations(

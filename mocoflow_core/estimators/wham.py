@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from mocoflow_core.estimators import bodies
 from mocoflow_core.estimators.bodies import Bodies
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.estimate_file import EstimateFile, people_of
 from mocoflow_core.estimators.placement import ToolCamera, placed
-from mocoflow_core.estimators.stored import Stored, people_of
 from mocoflow_core.estimators.tracks import Track, choose_track, frames_of, row_arrays
 
 TOOL = "WHAM"
@@ -26,7 +26,7 @@ VERTICES = ("verts", "verts_cam")
 FRAMES = ("frame_ids", "frame_id")
 
 
-def recognises(stored: Stored) -> bool:
+def recognises(stored: EstimateFile) -> bool:
     """Records placed in the camera's and the world's axes."""
     people = people_of(stored.content)
     return bool(people) and all(
@@ -36,13 +36,13 @@ def recognises(stored: Stored) -> bool:
     )
 
 
-def read(stored: Stored, known: Known) -> BodyEstimate:
+def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     """One person, in the camera's axes for its intrinsics. Raises InputError without faces."""
     tracks = [_track(person, record) for person, record in people_of(stored.content).items()]
-    track, chosen = choose_track(tracks, known.chosen.person)
-    found = _bodies(track, known)
-    made_for = ToolCamera.of_diagonal(known.camera, known.chosen.focal_px)
-    vertices, refocus = placed(TOOL, found.vertices, made_for, known.camera)
+    track, chosen = choose_track(tracks, context.chosen.person)
+    found = _bodies(track, context)
+    made_for = ToolCamera.of_diagonal(context.camera, context.chosen.focal_px)
+    vertices, refocus = placed(TOOL, found.vertices, made_for, context.camera)
     return BodyEstimate(
         source=TOOL,
         frame_indices=track.frame_indices,
@@ -61,13 +61,13 @@ def _track(person: int, record: Mapping[str, object]) -> Track:
     return Track(person, frames, row_arrays(record, len(frames), name))
 
 
-def _bodies(track: Track, known: Known) -> Bodies:
+def _bodies(track: Track, context: EstimateContext) -> Bodies:
     pose = _pose(track)
     betas = track.rows("betas") if "betas" in track.arrays else None
     name = next((name for name in VERTICES if name in track.arrays), None)
     if name is None and pose is not None and betas is not None:
-        return bodies.modelled(TOOL, pose, betas, known, track.floats("trans", 3))
-    return bodies.stored(TOOL, track.bodies(name or VERTICES[0]), pose, betas, known)
+        return bodies.modelled(TOOL, pose, betas, context, track.floats("trans", 3))
+    return bodies.stored(TOOL, track.bodies(name or VERTICES[0]), pose, betas, context)
 
 
 def _pose(track: Track) -> NDArray[np.float64] | None:

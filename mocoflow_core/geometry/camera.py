@@ -31,6 +31,11 @@ class Camera:
     distortion: Array = field(default_factory=_no_distortion)  # (5,)
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.width, self.height
+
+    @property
     def centre_world(self) -> Array:
         """Position of the camera, (3,) world metres."""
         return -self.R.T @ self.t

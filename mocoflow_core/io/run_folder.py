@@ -47,6 +47,7 @@ class RunRecord(BaseModel):
     store: str
     license: str = ""
     attribution: str = ""
+    remarks: tuple[str, ...] = ()  # of the scene, for whoever reads the scores
     overhead_s: float = 0.0
     machine: dict[str, JsonValue] = {}
     stages: tuple[StageRecord, ...] = ()

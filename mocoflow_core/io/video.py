@@ -41,11 +41,11 @@ def describe_video(path: Path) -> VideoDescription:
     """
     try:
         with av.open(str(path)) as container:
-            stream = _video_stream(container, path)
+            stream = video_stream(container, path)
             count = sum(1 for packet in container.demux(stream) if packet.size)
             return VideoDescription(float(stream.average_rate or 0.0), count)
     except av.FFmpegError as error:
-        raise _undecodable(path, error.strerror or str(error)) from error
+        raise undecodable(path, error.strerror or str(error)) from error
 
 
 def decode_to_the_end(path: Path) -> DecodedVideo:
@@ -56,14 +56,14 @@ def decode_to_the_end(path: Path) -> DecodedVideo:
     count, width, height = 0, 0, 0
     try:
         with av.open(str(path)) as container:
-            for frame in container.decode(_video_stream(container, path)):
+            for frame in container.decode(video_stream(container, path)):
                 if not count:
                     height, width = _upright(frame).shape[:2]
                 count += 1
     except av.FFmpegError as error:
-        raise _undecodable(path, error.strerror or str(error)) from error
+        raise undecodable(path, error.strerror or str(error)) from error
     if not count:
-        raise _undecodable(path, "no frame")
+        raise undecodable(path, "no frame")
     return DecodedVideo(count, width, height)
 
 
@@ -76,7 +76,7 @@ def read_frames(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, Imag
     remaining = set(wanted)
     try:
         with av.open(str(path)) as container:
-            stream = _video_stream(container, path)
+            stream = video_stream(container, path)
             for number, frame in enumerate(container.decode(stream)):
                 if number in remaining:
                     remaining.discard(number)
@@ -84,9 +84,9 @@ def read_frames(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, Imag
                 if not remaining:
                     return
     except av.FFmpegError as error:
-        raise _undecodable(path, error.strerror or str(error)) from error
+        raise undecodable(path, error.strerror or str(error)) from error
     if remaining:
-        raise _undecodable(path, f"no frame {min(remaining)}")
+        raise undecodable(path, f"no frame {min(remaining)}")
 
 
 def write_video(path: Path, frames: Iterable[Image], fps: float) -> None:
@@ -109,9 +109,9 @@ def write_video(path: Path, frames: Iterable[Image], fps: float) -> None:
         container.mux(stream.encode(None))
 
 
-def _video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:
+def video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:
     if not container.streams.video:
-        raise _undecodable(path, "no video stream")
+        raise undecodable(path, "no video stream")
     return container.streams.video[0]
 
 
@@ -120,7 +120,7 @@ def _upright(frame: av.VideoFrame) -> Image:
     return np.rot90(frame.to_ndarray(format="rgb24"), k=round(frame.rotation / 90))
 
 
-def _undecodable(path: Path, found: str) -> InputError:
+def undecodable(path: Path, found: str) -> InputError:
     return InputError(
         f"{path.name} must be a video that can be decoded",
         found,

@@ -12,6 +12,7 @@ from mocoflow_core.body.rasterise import rasterise
 from mocoflow_core.body.rasterise import surface_points as points_on_mesh
 from mocoflow_core.methods.rendered_views import ScoredView, TrainedRenderer
 from mocoflow_core.methods.scored_views import Subject
+from mocoflow_core.methods.truth_file import read_truth
 from mocoflow_core.metrics.surface import surface_mm
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.rendering.surface_points import surface_points
@@ -27,10 +28,11 @@ def surface_rows(
     truth: Path,
 ) -> list[ScoreRow]:
     """``surface_mm`` of both methods at the given views; none where the truth has no surface."""
-    with np.load(truth, allow_pickle=False) as file:
-        if "vertices" not in file or "faces" not in file:
-            return []
-        frames, vertices, faces = file["frame_indices"], file["vertices"], file["faces"]
+    known = read_truth(truth)
+    if not {"vertices", "faces"} <= set(known):
+        return []
+    frames, vertices = known["frame_indices"], known["vertices"]
+    faces = known["faces"].astype(np.int32)
     true_row = {int(frame): row for row, frame in enumerate(frames)}
     rows = []
     for view in views:

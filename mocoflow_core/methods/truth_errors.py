@@ -23,6 +23,7 @@ from mocoflow_core.fields.body_lattices import (
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.methods.rendered_views import TrainedRenderer
 from mocoflow_core.methods.scored_views import Subject
+from mocoflow_core.methods.truth_file import read_truth
 from mocoflow_core.metrics.consensus import consensus_global_mm, consensus_local_mm
 from mocoflow_core.metrics.correspondence import correspondence_mm, draw_pairs
 from mocoflow_core.metrics.keypoints import (
@@ -184,8 +185,7 @@ def _against_truth(
     truth: Path,
     configuration: TruthConfig,
 ) -> list[Measured]:
-    with np.load(truth, allow_pickle=False) as file:
-        arrays = {name: file[name] for name in file.files}
+    arrays = read_truth(truth)
     frames, known, ours = np.intersect1d(
         arrays["frame_indices"], clip.frame_indices, return_indices=True
     )

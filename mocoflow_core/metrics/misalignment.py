@@ -50,6 +50,10 @@ class Misplacement(NamedTuple):
     def unit(self) -> str:
         return "px" if self.kind == "shifted" else "degrees"
 
+    def moved_px(self, scale: float) -> float | None:
+        """Pixels of a working picture with ``scale`` of them for one of the paper's crop."""
+        return scale * self.amount if self.kind == "shifted" else None
+
 
 MISPLACEMENTS = (
     *(Misplacement("shifted", px) for px in SHIFTS_PX),
@@ -87,27 +91,18 @@ def misalignment_rows(
     Source: MoCo-Flow Table 1. Where it does not say the direction: the mean over right, left, down
     and up, and over both senses of turning about the middle of the person's box.
     """
-    reading = protocol(
-        configuration,
-        side,
-        [
-            f"n px are n x {side}/{configuration.crop_reference_px} px of this picture",
-            "mean over four directions, or both senses of turning about the middle of the box",
-        ],
-    )
+    reading = protocol(configuration, side, misplaced_notes(side, configuration))
     rows = []
     for misplacement in MISPLACEMENTS:
         found = [
             _scores(on_white(rgb, mask), mask, move, side)
             for rgb, mask in views
-            for move in _moves(misplacement, mask, side / configuration.crop_reference_px)
+            for move in moves(misplacement, mask, side / configuration.crop_reference_px)
         ]
-        shifted = misplacement.kind == "shifted"
-        moved_px = misplacement.amount * side / configuration.crop_reference_px
+        moved_px = misplacement.moved_px(side / configuration.crop_reference_px)
         rows += [
             MisalignmentRow(
-                *(scene, misplacement.kind, misplacement.amount, misplacement.unit),
-                moved_px if shifted else None,
+                *(scene, misplacement.kind, misplacement.amount, misplacement.unit, moved_px),
                 metric,
                 float(np.mean([scores[metric] for scores in found])),
                 len(views),
@@ -116,6 +111,14 @@ def misalignment_rows(
             for metric in (found[0] if found else {})
         ]
     return rows
+
+
+def misplaced_notes(side: int, configuration: EvaluationConfig) -> list[str]:
+    """What the protocol of a misplaced view says besides the scores' own."""
+    return [
+        f"n px are n x {side}/{configuration.crop_reference_px} px of this picture",
+        "mean over four directions, or both senses of turning about the middle of the box",
+    ]
 
 
 def write_misalignment(rows: Iterable[MisalignmentRow], path: Path) -> None:
@@ -129,8 +132,11 @@ def read_misalignment(path: Path) -> list[MisalignmentRow]:
     return [MisalignmentRow(**record) for record in parquet.read_table(path).to_pylist()]
 
 
-def _moves(misplacement: Misplacement, mask: Mask, scale: float) -> Iterator[NDArray[np.float64]]:
-    """Each direction as a matrix (2, 3) from pixels to pixels."""
+def moves(misplacement: Misplacement, mask: Mask, scale: float) -> Iterator[NDArray[np.float64]]:
+    """Each direction of a misplacement as a matrix (2, 3) from pixels to pixels.
+
+    ``scale``: pixels of this picture for one of the paper's crop.
+    """
     kind, amount = misplacement
     if kind == "shifted":
         for x, y in _DIRECTIONS:
@@ -142,12 +148,16 @@ def _moves(misplacement: Misplacement, mask: Mask, scale: float) -> Iterator[NDA
         yield np.asarray(cv2.getRotationMatrix2D(middle, degrees, 1.0), np.float64)
 
 
+def moved_picture(picture: Image, move: NDArray[np.float64]) -> Image:
+    """A picture (H, W, 3) on white, moved by a matrix (2, 3)."""
+    size, white = (picture.shape[1], picture.shape[0]), (WHITE,) * 3
+    moved = cv2.warpAffine(picture, move, size, flags=cv2.INTER_LINEAR, borderValue=white)
+    return np.asarray(moved, np.float32)
+
+
 def _scores(truth: Image, mask: Mask, move: NDArray[np.float64], side: int) -> dict[str, float]:
     size = (mask.shape[1], mask.shape[0])
-    white = (WHITE,) * 3
-    moved = np.asarray(
-        cv2.warpAffine(truth, move, size, flags=cv2.INTER_LINEAR, borderValue=white), np.float32
-    )
+    moved = moved_picture(truth, move)
     covered = cv2.warpAffine(mask.astype(np.float32), move, size, flags=cv2.INTER_LINEAR) > 0.5
     crop = crop_around(mask, side)
     ours, theirs = crop.of(moved, WHITE), crop.of(truth, WHITE)

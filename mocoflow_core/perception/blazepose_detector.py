@@ -79,7 +79,8 @@ class BlazePoseDetector:
         """Places (B, anchors, 6, 2) as ``_merge`` takes them, and their confidence."""
         pictures = batch.to(self._device, memory_format=torch.channels_last) / 127.5 - 1
         grids = self._network(pictures)
-        places = _joined(grids[: len(GRIDS)], 12).reshape(len(batch), -1, 6, 2) / SIZE
+        places = _joined(grids[: len(GRIDS)], 12).reshape(len(batch), -1, 6, 2)
+        places /= np.float32(SIZE)
         places[:, :, POINTS] += _anchors()[:, None]
         return places, expit(_joined(grids[len(GRIDS) :], 1)[..., 0])
 

@@ -65,7 +65,8 @@ class BlazePoseLandmarks:
             inputs = batch.to(self._device, memory_format=torch.channels_last) / 255
             outputs = [output.cpu().numpy() for output in self._network(inputs)]
             for values in zip(*outputs, strict=True):
-                found.append(_pose(*values, regions[len(found)]))
+                landmarks, flag, mask, heat, world = values
+                found.append(_pose(landmarks, flag, mask, heat, world, regions[len(found)]))
         return found
 
 
@@ -78,7 +79,7 @@ def _pose(
     region: Region,
 ) -> Pose:
     raw = landmarks.reshape(39, 5)
-    places = region.places(_refined(raw[:, :2] / SIZE, expit(heat)))
+    places = region.places(_refined(raw[:, :2] / np.float32(SIZE), expit(heat)))
     points = world.reshape(39, 3)[:BODY].copy()
     points[:, :2] = points[:, :2] @ region.rotation.T
     return Pose(

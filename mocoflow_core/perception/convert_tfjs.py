@@ -30,7 +30,9 @@ ACTIVATIONS = {"Relu": "relu", "Relu6": "relu6"}
 class Converter:
     """Walks back from the outputs and writes down each operation once."""
 
-    def __init__(self, model: Mapping[str, Any], values: Mapping[str, NDArray[Any]], start: str):
+    def __init__(
+        self, model: Mapping[str, Any], values: Mapping[str, NDArray[Any]], start: str
+    ) -> None:
         self.nodes: list[dict[str, Any]] = []
         self.weights: dict[str, NDArray[Any]] = {}
         self._given = {node["name"]: node for node in model["modelTopology"]["node"]}
@@ -95,7 +97,7 @@ class Converter:
 
     def _add(self, op: str, *takes: str, **settings: Any) -> str:  # noqa: ANN401
         name = f"{op}{len(self.nodes)}"
-        self.nodes.append(Node(name=name, op=op, takes=takes, **settings).model_dump())  # type: ignore[arg-type]
+        self.nodes.append(Node(name=name, op=op, takes=takes, **settings).model_dump())
         return name
 
 

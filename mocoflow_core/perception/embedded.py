@@ -56,7 +56,7 @@ def read_weights(path: Path) -> Weights:
         raise InputError("Weights by path", f"no file {path}", "Give a safetensors file.")
     try:
         with safe_open(path, "pt") as file:
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+            tensors = {key: file.get_tensor(key) for key in file.keys()}
             return Weights(tensors, file.metadata() or {}, digest_file(path))
     except SafetensorError as error:
         raise InputError(f"{path} as safetensors", str(error), "Convert the weights.") from error

@@ -67,16 +67,16 @@ class GraphNetwork(nn.Module):
         super().__init__()
         self._graph = graph
         for name, tensor in weights.items():
-            node, part = name.split(".")
+            node, _, part = name.rpartition(".")
             scale = weights.get(f"{node}.scale", 1.0) if part == "weight" else 1.0
-            self.register_buffer(f"{node}_{part}", tensor.float() * scale)
+            self.register_buffer(f"{node}_{part}", _laid_out(tensor.float() * scale))
         uses = {name: node.name for node in graph.nodes for name in node.takes}
         self._last_use = {name: user for name, user in uses.items() if name not in graph.outputs}
 
     @torch.no_grad()
     def forward(self, pictures: Tensor) -> list[Tensor]:
         """Outputs of pictures (N, C, H, W), in the order of ``Graph.outputs``."""
-        found = {INPUT: pictures}
+        found = {INPUT: _laid_out(pictures)}
         for node in self._graph.nodes:
             found[node.name] = self._evaluate(node, [found[name] for name in node.takes])
             for name in node.takes:
@@ -86,6 +86,8 @@ class GraphNetwork(nn.Module):
 
     def _evaluate(self, node: Node, takes: Sequence[Tensor]) -> Tensor:
         first = takes[0]
+        # Nobody looks at the value again, so that its memory can take the result.
+        spare = node.takes[0] != INPUT and self._last_use.get(node.takes[0]) == node.name
         match node.op:
             case "convolve":
                 weight = getattr(self, f"{node.name}_weight")
@@ -101,17 +103,22 @@ class GraphNetwork(nn.Module):
             case "max_pool":
                 return F.max_pool2d(first, node.kernel, node.stride, node.padding)
             case "leaky_relu":
-                return F.leaky_relu(first, node.slope)
+                return F.leaky_relu(first, node.slope, inplace=spare)
             case "relu":
-                return F.relu(first)
+                return F.relu(first, inplace=spare)
             case "relu6":
-                return F.relu6(first)
+                return F.relu6(first, inplace=spare)
             case "sigmoid":
                 return torch.sigmoid(first)
             case "widen":
                 return F.pad(first, (0, 0, 0, 0, 0, node.channels))
             case "depth_to_space":
                 return _depth_to_space(first)
+
+
+def _laid_out(tensor: Tensor) -> Tensor:
+    """Channels beside each other in memory: a tenth to a third faster on a CPU."""
+    return tensor.contiguous(memory_format=torch.channels_last) if tensor.ndim == 4 else tensor
 
 
 def _padded(picture: Tensor, node: Node) -> tuple[Tensor, int]:

@@ -18,7 +18,7 @@ SIDE_PX = 256
 CELLS = 64
 NEARNESS_CELLS = 1.8  # A heat map counts as heat / (distance from the expected place + this).
 BOX_MARGIN = 1.25
-BATCH = 4
+BATCH = 1  # More at once leave the cache and take longer each.
 
 
 class MoveNetThunder:

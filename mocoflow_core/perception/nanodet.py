@@ -23,7 +23,7 @@ BINS = 11  # of the distribution over each distance from a cell to a side of its
 MEAN_BGR = (103.53, 116.28, 123.675)
 STD_BGR = (57.375, 57.12, 58.395)
 OVERLAP = 0.6  # Of two boxes that overlap more, the less confident one is dropped.
-BATCH = 8
+BATCH = 4
 
 
 class NanoDet:

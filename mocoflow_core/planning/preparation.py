@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocoflow_core.capture.composite import BehindPerson
+from mocoflow_core.capture.scene_description import BehindPerson
 from mocoflow_core.errors import InputError
 from mocoflow_core.planning.configuration import PlanConfig
 from mocoflow_core.planning.decision import Decision

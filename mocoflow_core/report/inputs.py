@@ -20,7 +20,7 @@ class ReportInputs:
 
     ``run`` holds what ``run.json`` holds: scene, preset, seed, configuration, machine, stages
     [{name, wall_s, cpu_s, cached}], cameras; optional ``method`` (default ``mocoflow``),
-    ``command``, ``license`` and ``attribution``.
+    ``command``, ``license``, ``attribution`` and ``remarks``.
     """
 
     run: Mapping[str, Any]

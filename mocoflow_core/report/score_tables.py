@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mocoflow_core.methods.person_scores import PHOTOGRAPH
+from mocoflow_core.metrics.bootstrap import mean_interval
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.report.inputs import BASELINE
 from mocoflow_core.report.metric_labels import (
@@ -16,13 +18,15 @@ from mocoflow_core.report.metric_labels import (
     label_of,
 )
 
-HEADLINES = ("psnr_union", "ssim", "mask_iou", "keypoint_mm")
+HEADLINES = ("psnr_union", "ssim", "mask_iou", "plausibility", "oks", "keypoint_mm")
 
 
 class Cell(NamedTuple):
-    """One mean; ``best`` where no other method of the camera is better."""
+    """One mean, its 95 % interval over the views (empty where there are too few), and whether no
+    other method of the camera is better."""
 
     text: str
+    interval: str
     best: bool
 
 
@@ -108,55 +112,62 @@ def headlines(rows: Sequence[ScoreRow], method: str, train_camera: str) -> list[
     """The key numbers over held-out cameras, or over the train camera's held-out frames."""
     ours = key_numbers(rows, method, train_camera)
     theirs = key_numbers(rows, BASELINE, train_camera)
+    most = key_numbers(rows, PHOTOGRAPH, train_camera)
     found = []
     for metric in HEADLINES:
         if metric not in ours:
             continue
-        label, note = label_of(metric), ""
+        label, notes = label_of(metric), []
         if metric in theirs:
             name = "before" if metric in BODY_METRICS else "posed mesh"
-            note = f"{name} {label.text(theirs[metric])}"
-        found.append(Headline(label.title, label.text(ours[metric]), label.unit, note))
+            notes.append(f"{name} {label.text(theirs[metric])}")
+        if metric in most:
+            notes.append(f"photographs {label.text(most[metric])}")
+        text = label.text(ours[metric])
+        found.append(Headline(label.title, text, label.unit, ", ".join(notes)))
     return found
 
 
 def key_numbers(rows: Sequence[ScoreRow], method: str, train_camera: str) -> dict[str, float]:
     """One number for each metric of a method in a run.
 
-    Pictures: the mean over held-out cameras or, where there are none, over the train camera's
+    Pictures: the mean over other cameras or, where a score has none, over the train camera's
     held-out frames. Motion and shape: the median over frames.
     """
-    pictures = [row for row in rows if row.metric not in BODY_METRICS]
-    novel = [row for row in pictures if row.camera != train_camera]
-    body = [row for row in rows if row.metric in BODY_METRICS]
-    judged = [*(novel or pictures), *body]
-    return {
-        metric: float((np.nanmedian if metric in BODY_METRICS else np.mean)(values))
-        for metric in dict.fromkeys(row.metric for row in judged)
-        if (values := _values(judged, method, metric))
-    }
+    numbers = {}
+    for metric in dict.fromkeys(row.metric for row in rows):
+        named = [row for row in rows if row.metric == metric]
+        novel = [row for row in named if row.camera != train_camera]
+        body = metric in BODY_METRICS
+        if values := _values(named if body else novel or named, method, metric):
+            numbers[metric] = float(np.nanmedian(values) if body else np.mean(values))
+    return numbers
 
 
 def _camera_rows(title: str, rows: list[ScoreRow], metrics: list[str]) -> list[CameraRow]:
     methods = list(dict.fromkeys(row.method for row in rows))
-    means = {
-        (method, metric): float(np.mean(values)) if values else float("nan")
-        for method in methods
-        for metric in metrics
-        for values in [_values(rows, method, metric)]
-    }
+    values = {(m, metric): _values(rows, m, metric) for m in methods for metric in metrics}
+    means = {key: float(np.mean(found)) if found else float("nan") for key, found in values.items()}
+    rivals = [method for method in methods if method != PHOTOGRAPH]
     table = []
     for method in methods:
-        views = len({(r.camera, r.frame_index, r.seed) for r in rows if r.method == method})
+        views = max(len(values[method, metric]) for metric in metrics)
         cells = [
             Cell(
                 label_of(metric).text(means[method, metric]),
-                _is_best(means[method, metric], [means[m, metric] for m in methods], metric),
+                _interval(values[method, metric], label_of(metric)),
+                method in rivals
+                and _is_best(means[method, metric], [means[m, metric] for m in rivals], metric),
             )
             for metric in metrics
         ]
         table.append(CameraRow(title, method, views, cells))
     return table
+
+
+def _interval(values: list[float], label: MetricLabel) -> str:
+    low, high = mean_interval(values)
+    return "" if np.isnan(low) else f"{label.text(low)}–{label.text(high)}"
 
 
 def _is_best(value: float, all_values: list[float], metric: str) -> bool:

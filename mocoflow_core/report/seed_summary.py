@@ -12,7 +12,7 @@ from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.report.score_tables import key_numbers
 
 METRICS = (
-    *("psnr_union", "psnr", "ssim", "mask_iou"),
+    *("psnr_union", "psnr", "ssim", "lpips_alex", "mask_iou", "plausibility", "oks"),
     *("keypoint_mm", "surface_mm", "correspondence_mm"),
 )
 

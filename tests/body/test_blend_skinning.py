@@ -259,7 +259,9 @@ def test_the_made_person_is_a_person(model):
 
 
 def test_smplx_package_agrees(tmp_path):
-    smplx = pytest.importorskip("smplx")
+    smplx = pytest.importorskip(
+        "smplx", reason="smplx's licence is non-commercial: who may use it installs it by hand"
+    )
     arrays = small_smpl()
     path = tmp_path / "SMPL_NEUTRAL.npz"
     write_smpl(path)

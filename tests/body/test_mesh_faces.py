@@ -31,7 +31,8 @@ def test_texture_seams_in_an_obj_split_no_vertex(tmp_path):
         "vt 0 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/2/1\nf 1/2 3/2 4/1\nf -4 -3 -2 -1\n"
     )
     expected = [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3]]
-    assert read_faces(tmp_path / "consensus.obj", 4).tolist() == expected
+    faces = read_faces(tmp_path / "consensus.obj", 4)
+    assert [np.roll(face, -face.argmin()).tolist() for face in faces] == expected
 
 
 def test_faces_of_another_body_are_refused(tmp_path):
@@ -39,7 +40,7 @@ def test_faces_of_another_body_are_refused(tmp_path):
     with pytest.raises(InputError, match="must be a mesh of 6890 vertices, got 8 vertices"):
         read_faces(tmp_path / "mesh.ply", 6890)
     (tmp_path / "bad.obj").write_text("v 0 0 0\nf 1 2 99999999999\n")
-    with pytest.raises(InputError, match="must be a mesh of 1 vertices"):
+    with pytest.raises(InputError, match="cannot be read as one"):
         read_faces(tmp_path / "bad.obj", 1)
 
 

@@ -74,6 +74,9 @@ def test_bodies_are_those_that_were_written_and_every_check_holds(read, filmed):
     scene = read()
     np.testing.assert_allclose(scene.meshes.sequence.vertices, filmed.meshes.vertices, atol=1e-4)
     assert (scene.meshes.coordinates, scene.meshes.located) == ("world", True)
+    fitted, favoured = scene.caveats
+    assert "fitted to the evaluation cameras' pictures" in fitted
+    assert "mask_iou and psnr_union favour these bodies" in favoured
     findings = check_dataset(scene)
     assert findings.measured["overlap at +0 of c09"] > 0.75
 

@@ -125,3 +125,9 @@ def test_videos_of_another_shape_are_refused(filmed):
     wide = replace(filmed.cameras["c01"], width=1920, height=1080)
     with pytest.raises(InputError, match="640 x 480"):
         for_pictures(wide, 640, 480)
+
+
+def test_a_setting_that_leads_elsewhere_is_refused(folder):
+    (folder / "mapping.txt").write_text(f"{SEQUENCE} ../elsewhere\n")
+    with pytest.raises(InputError, match=r"mapping\.txt"):
+        read_cameras(folder, SEQUENCE, 0.01)

@@ -92,12 +92,27 @@ def test_the_plate_is_taken_from_around_a_body_that_never_moves_away(on_the_spot
     frames = InMemory(on_the_spot.frames("c01"))
     bodies = BodyRegions(on_the_spot.meshes, on_the_spot.cameras["c01"])
     choice, person = PlateChoice(6, 30), on_the_spot.masks["c01"].all(axis=0)
-    plain, around = (clip_plate(frames, None, known, choice) for known in (None, bodies))
+    plain, around = (
+        clip_plate(frames, None, known, choice, frames.indices) for known in (None, bodies)
+    )
     assert (np.abs(plain[person].astype(int) - CLOTHES) < 5).all()
     assert (np.abs(around[person].astype(int) - CLOTHES).max(axis=-1) > 30).mean() > 0.95
     masks = DifferenceMasks(frames, around, 30, bodies)
     for number, mask in masks.read([0, 5]):
         assert mask_iou(mask, on_the_spot.masks["c01"][number]) > 0.8
+
+
+@pytest.mark.parametrize("given", ["nothing", "bodies", "masks"])
+def test_held_out_frames_are_no_part_of_the_plate(on_the_spot, given):
+    pictures = on_the_spot.frames("c01")
+    pictures[1::2] = 255
+    frames, learned = InMemory(pictures), np.arange(0, 6, 2, dtype=np.int32)
+    bodies = BodyRegions(on_the_spot.meshes, on_the_spot.cameras["c01"])
+    masks = InMemory(on_the_spot.masks["c01"])
+    known = {"nothing": (None, None), "bodies": (None, bodies), "masks": (masks, None)}[given]
+    plate = clip_plate(frames, *known, PlateChoice(6, 30), learned)
+    beside = ~on_the_spot.masks["c01"].any(axis=0)
+    assert plate[beside].max() < 200
 
 
 def test_masks_of_a_folder_count_the_videos_frames_not_the_grids(tmp_path):

@@ -138,6 +138,16 @@ def test_bodies_that_are_a_frame_late_are_told():
     assert "with the meshes moved by +1 frame" in warnings(late)
 
 
+def test_what_evaluation_cameras_show_stands_apart():
+    masks = {
+        number: np.roll(mask, 20, axis=1)
+        for number, mask in SOUND.cameras["side"].masks.pictures.items()
+    }
+    findings = check_dataset(with_camera(SOUND, "side", masks=MemoryFrames(masks)))
+    assert findings.warnings == ()
+    assert any("side: silhouettes overlap the masks by" in said for said in findings.elsewhere)
+
+
 def test_a_giant_is_told():
     assert "2.6" in warnings(with_vertices(lambda bodies: bodies * np.float32(1.5)))
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
+from trimesh.exchange.obj import export_obj
 
 from mocoflow_core.body.silhouette import overlap, silhouettes
 from mocoflow_core.capture.extract import CaptureConfig, extract_clip
@@ -14,8 +16,10 @@ from mocoflow_core.datasets.dataset_checks import check_dataset
 from mocoflow_core.datasets.people_snapshot import PeopleSnapshotConfig, read_people_snapshot
 from mocoflow_core.datasets.write_dataset import write_dataset
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.configuration import EstimateConfig
 from mocoflow_core.estimators.ingest import ingest_meshes
 from tests.datasets.snapshot_layout import turning, write_snapshot
+from tests.estimators.layouts import write_people
 from tests.lossless_video import write_lossless
 from tests.small_smpl import write_smpl
 
@@ -72,9 +76,9 @@ def test_camera_masks_bodies_and_pixels_are_those_that_were_filmed(scene, record
     assert np.allclose(recorded.camera.K, recording.camera.K, atol=1e-12)
     assert np.array_equal(recorded.camera.distortion, recording.camera.distortion)
     assert np.array_equal(pictures(recorded.masks), recording.masks)
-    on_white = np.where(recording.masks[..., None], recording.frames, np.uint8(255))
-    assert np.array_equal(pictures(recorded.frames), on_white)
-    assert (recorded.background == 255).all()
+    assert np.array_equal(pictures(recorded.frames), recording.frames)
+    assert recorded.background is None
+    assert scene.behind_person == "white"
     assert np.allclose(scene.meshes.sequence.vertices, recording.bodies, atol=1e-5)
     assert (scene.fps, scene.working_fps, scene.truth) == (24.0, 12.0, None)
 
@@ -131,7 +135,7 @@ def test_every_choice_is_followed(write, models, recording):
     assert scene.meshes.sequence.frame_indices.tolist() == [3, 4, 5, 6, 7, 8]
     assert scene.working_fps == 8.0
     assert np.array_equal(pictures(recorded.frames), recording.frames[3:9])
-    assert recorded.background is None
+    assert scene.behind_person == "kept"
     eroded = pictures(recorded.masks)
     assert 0.5 < eroded.sum() / recording.masks[3:9].sum() < 0.95
     assert not (eroded & ~recording.masks[3:9]).any()
@@ -171,9 +175,32 @@ def test_a_video_that_was_turned_is_refused(write, recording):
     wide = np.concatenate([recording.frames, recording.frames[:, :, :48]], axis=2)
     write_lossless(folder / f"{folder.name}.mp4", wide)
     told = refusal(folder)
-    assert "must be 96 x 96 as camera.pkl says, got 144 x 96" in told
+    assert "must be 96 x 96 as the calibration says, got 144 x 96" in told
     assert "turned" in told
 
 
 def test_masks_of_another_size_are_refused(write, recording):
     assert "masks.hdf5 must be 96 x 96" in refusal(write(masks=recording.masks[:, ::2]))
+
+
+def test_an_estimate_of_the_whole_video_fits_the_imported_clip(write, recording, tmp_path):
+    chosen = PeopleSnapshotConfig(bodies="none", first_frame=3, frames=6)
+    write_dataset(read_people_snapshot(write(), chosen), tmp_path / "scene")
+    middles = recording.bodies.mean(axis=1)
+    side = np.full(FRAMES, 60.0)
+    record = {
+        "pred_cam": np.column_stack(
+            [2 * 150 / middles[:, 2] / (1.1 * side), *np.zeros((2, FRAMES))]
+        ),
+        "bboxes": np.column_stack([recording.camera.project(middles), side, side]),
+        "verts": (recording.bodies - middles[:, None]).astype(np.float32),
+        "frame_ids": np.arange(FRAMES),
+    }
+    vibe = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    faces = Trimesh(recording.bodies[0], recording.model.faces, process=False)
+    (tmp_path / "faces.obj").write_text(export_obj(faces))
+    estimate = EstimateConfig(faces=tmp_path / "faces.obj")
+    ingested = ingest_meshes(open_scene(tmp_path / "scene"), vibe, estimate)
+    assert ingested.meshes.frame_indices.tolist() == [3, 4, 5, 6, 7, 8]
+    assert np.array_equal(ingested.meshes.vertices, record["verts"][3:9])
+    assert any("frames 0 to 11 of the source" in said for said in ingested.warnings)

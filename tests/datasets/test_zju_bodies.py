@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from trimesh import Trimesh
 
 from mocoflow_core.body.blend_skinning import posed_vertices
 from mocoflow_core.body.smpl_file import read_smpl_model
@@ -126,3 +127,20 @@ def test_vertices_of_another_body_than_the_faces_are_refused(tmp_path, model_fil
     folder = write(tmp_path, "new_vertices", np.zeros((3, 100, 3)))
     with pytest.raises(InputError, match="100 vertices"):
         read_bodies(folder, NUMBERS, BodySource(body_model=model_file))
+
+
+def test_faces_of_another_number_of_vertices_are_refused(tmp_path, model_file, parameters):
+    """Faces of fewer vertices than the body has name none that is missing."""
+    folder = write(tmp_path, "new_vertices", expected(model_file, parameters, True))
+    small = Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+    small.export(tmp_path / "small.obj")
+    with pytest.raises(InputError, match="3 vertices"):
+        read_bodies(folder, NUMBERS, BodySource(faces=tmp_path / "small.obj"))
+
+
+def test_a_few_stray_bodies_do_not_cut_the_clip(tmp_path, model_file, parameters):
+    write(tmp_path, "new_params", parameters)
+    write(tmp_path, "new_vertices", expected(model_file, parameters, True)[:2])
+    meshes, remarks = read_bodies(tmp_path, NUMBERS, BodySource(body_model=model_file))
+    assert meshes.sequence.frame_indices.tolist() == NUMBERS.tolist()
+    assert remarks[0] == "bodies are those of new_params"

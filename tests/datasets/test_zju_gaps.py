@@ -73,7 +73,7 @@ def test_a_train_frame_without_any_mask_cuts_the_clip(read):
 
 def test_evaluation_frames_without_a_mask_are_skipped(read):
     scene = read(without=["mask*/Camera_B2/000002.png", "Camera_B3/000004.jpg"])
-    assert scene.cameras["Camera_B2"].frames.indices.tolist() == [0, 4]
+    assert scene.cameras["Camera_B2"].masks.indices.tolist() == [0, 4]
     assert scene.cameras["Camera_B3"].frames.indices.tolist() == [0, 2]
     assert said(scene, "1 of 3 masks of Camera_B2 are missing")
     assert said(scene, "1 of 3 pictures of Camera_B3 are missing")
@@ -145,5 +145,6 @@ def test_313_counts_from_1_in_pictures_masks_and_bodies(tmp_path):
     assert scene.train_camera == "Camera_1"
     assert len(scene.cameras) == 21
     assert train_frames(scene) == [1, 2, 3]
+    assert scene.source_begins_at == 1
     assert scene.meshes.sequence.frame_indices.tolist() == [1, 2, 3]
     assert_allclose(scene.cameras["Camera_22"].camera.t, filmed.cameras["Camera (22)"].t)

@@ -7,7 +7,7 @@ import pytest
 
 from mocoflow_core.body.smpl_file import read_smpl_model
 from mocoflow_core.estimators.configuration import EstimateConfig
-from mocoflow_core.estimators.known import Known
+from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.read import read_estimate
 from tests.estimators.layouts import CAMERA, Person
 from tests.small_smpl import write_smpl, write_smplx
@@ -49,7 +49,7 @@ def read():
     """Reads an estimate as made from pictures of ``CAMERA``."""
 
     def reading(path, **chosen):
-        return read_estimate(path, Known(CAMERA, EstimateConfig(**chosen)))
+        return read_estimate(path, EstimateContext(CAMERA, EstimateConfig(**chosen)))
 
     return reading
 

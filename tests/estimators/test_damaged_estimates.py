@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import resource
+import zipfile
 from contextlib import suppress
 
 import numpy as np
@@ -81,6 +84,33 @@ def damages_of(record):
 
 
 KINDS = ["vibe", "wham", "phalp", "gvhmr", "tram", "romp", "aist_motion", "easymocap"]
+
+
+def test_a_ragged_pose_is_bad_input_before_the_kind_is_known(smpl, smplx, read, tmp_path):
+    record = record_of("vibe", smpl, smplx, tmp_path) | {"pose": [[1.0], [1.0, 2.0]]}
+    with pytest.raises(InputError, match=r"one of the known tools.*other arrays"):
+        read(write("vibe", record, tmp_path))
+
+
+def npz(tmp_path, compression=zipfile.ZIP_STORED, **contents):
+    with zipfile.ZipFile(tmp_path / "meshes.npz", "w", compression) as archive:
+        for name, content in contents.items():
+            archive.writestr(f"{name}.npy", content)
+    return tmp_path / "meshes.npz"
+
+
+@pytest.mark.parametrize("kind", ["auto", "native"])
+def test_our_own_mesh_files_are_as_strange_as_any(kind, read, tmp_path):
+    array = io.BytesIO()
+    np.save(array, np.zeros((2, 4, 3), np.float32))
+    vast = array.getvalue().replace(b"(2, 4, 3)", b"(9999999999999, 4, 3)")
+    bomb = array.getvalue() + bytes(2**28)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for content in (vast, bomb):
+        path = npz(tmp_path, zipfile.ZIP_DEFLATED, vertices=content)
+        with pytest.raises(InputError):
+            read(path, kind=kind)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**28 // 1024
 
 
 @pytest.mark.parametrize("kind", KINDS)

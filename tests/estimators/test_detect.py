@@ -11,7 +11,7 @@ import pytest
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.detect import detect
-from mocoflow_core.estimators.stored import Stored
+from mocoflow_core.estimators.estimate_file import EstimateFile
 from tests.estimators import layouts
 from tests.estimators.layouts import Person
 
@@ -58,34 +58,34 @@ def test_every_kind_is_told_by_its_content_under_any_name(written, tmp_path):
     for kind, path in written.items():
         renamed = tmp_path / "vibe_output.pkl"
         (shutil.copytree if path.is_dir() else shutil.copy)(path, renamed)
-        assert detect(Stored(renamed)) == kind
+        assert detect(EstimateFile(renamed)) == kind
         (shutil.rmtree if path.is_dir() else Path.unlink)(renamed)
 
 
 def test_the_api_of_wham_is_wham(person, tmp_path):
     path = layouts.write_wham(tmp_path / "a.pkl", {0: layouts.wham_api_record(person)})
-    assert detect(Stored(path)) == "wham"
+    assert detect(EstimateFile(path)) == "wham"
 
 
 def test_what_could_be_two_kinds_is_asked_about(person, read, faces_file, tmp_path):
     both = layouts.vibe_record(person) | layouts.wham_record(person)
     path = layouts.write_people(tmp_path / "a.pkl", {1: both})
     with pytest.raises(InputError, match=r"vibe or wham.*--set meshes\.kind=vibe"):
-        detect(Stored(path))
+        detect(EstimateFile(path))
     assert read(path, kind="wham", faces=faces_file).source == "WHAM"
 
 
 def test_an_unknown_dictionary_is_refused_with_its_keys_and_the_kinds_there_are(tmp_path):
     path = layouts.write_people(tmp_path / "a.pkl", {"weights": np.zeros(3), "bias": 1.0})
     with pytest.raises(InputError, match=r"vibe \(VIBE\).*a dictionary with weights, bias"):
-        detect(Stored(path))
+        detect(EstimateFile(path))
 
 
 def test_an_unknown_folder_is_refused_with_its_files(tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "notes.txt").write_text("nothing")
     with pytest.raises(InputError, match=r"a folder with notes\.txt"):
-        detect(Stored(tmp_path / "a"))
+        detect(EstimateFile(tmp_path / "a"))
 
 
 def test_a_kind_that_is_forced_on_something_else_is_refused_in_its_words(read, person, tmp_path):
@@ -107,7 +107,7 @@ def test_a_file_that_wants_to_run_something_is_refused_and_nothing_runs(write, t
     trace, path = tmp_path / "trace", tmp_path / "estimate"
     write(path, Planted(trace))
     with pytest.raises(InputError):
-        detect(Stored(path))
+        detect(EstimateFile(path))
     assert not trace.exists()
 
 

@@ -60,7 +60,7 @@ def test_bodies_of_smplx_are_refused(person, read, smpl_file, tmp_path):
     for record in records:
         record["poses"] = np.zeros((1, 87), np.float32)
     folder = write_zju(tmp_path / "smplx", records)
-    with pytest.raises(InputError, match="poses must have 4 x 24 x 3"):
+    with pytest.raises(InputError, match=r"poses of 72 finite numbers in .*SMPL's"):
         read(folder, body_model=smpl_file)
 
 
@@ -69,3 +69,23 @@ def test_another_file_among_them_is_refused_by_name(person, read, smpl_file, tmp
     np.save(folder / "7.npy", np.zeros((6890, 3)))
     with pytest.raises(InputError, match=r"7\.npy"):
         read(folder, body_model=smpl_file)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "words"),
+    [
+        ({"Th": np.full((1, 3), np.nan)}, r"Th of 3 finite numbers in 2\.npy"),
+        ({"shapes": np.zeros((1, 16))}, "10 and 16 numbers"),
+    ],
+)
+def test_spoilt_parameters_are_refused(person, read, smpl_file, tmp_path, spoilt, words):
+    records = easymocap_frames(person)
+    records[2] |= spoilt
+    with pytest.raises(InputError, match=words):
+        read(write_zju(tmp_path / "new_params", records), body_model=smpl_file)
+
+
+def test_more_shape_than_the_model_has_is_refused(person, read, smpl_file, tmp_path):
+    records = [{**record, "shapes": np.ones((1, 400))} for record in easymocap_frames(person)]
+    with pytest.raises(InputError, match="400 shape directions"):
+        read(write_zju(tmp_path / "new_params", records), body_model=smpl_file)

@@ -161,27 +161,17 @@ def test_no_mesh_at_all_is_refused(folder):
         ingest_meshes(open_scene(folder))
 
 
-@pytest.mark.parametrize(
-    ("content", "what"),
-    [
-        (b"", "an empty file"),
-        (b"PK broken", "no .npz archive"),
-        (b"\x93NUMPY", "no .npz archive"),
-        (b"\x80\x04 or anything else", "no .npz archive"),
-    ],
-)
-def test_a_file_that_is_no_archive_is_refused_in_words_of_our_own(folder, content, what):
+@pytest.mark.parametrize("content", [b"", b"PK broken", b"\x93NUMPY", b"\x80\x04 or anything else"])
+def test_a_file_that_is_no_archive_is_refused_by_its_name(folder, content):
     (folder / "meshes.npz").write_bytes(content)
-    with pytest.raises(InputError, match=r"meshes\.npz .* vertices, faces and") as refused:
+    with pytest.raises(InputError, match=r"meshes\.npz must be"):
         ingest_meshes(open_scene(folder))
-    assert what in refused.value.got
-    assert "pickle" not in str(refused.value)
 
 
-def test_a_single_array_is_no_archive(folder):
+def test_a_single_array_is_no_estimate(folder):
     with (folder / "meshes.npz").open("wb") as file:
         np.save(file, MESHES.vertices)
-    with pytest.raises(InputError, match=r"no \.npz archive"):
+    with pytest.raises(InputError, match=r"one of the kinds .*got a ndarray in meshes\.npz"):
         ingest_meshes(open_scene(folder))
 
 
@@ -189,13 +179,13 @@ def test_an_archive_of_something_else_is_refused(folder):
     with zipfile.ZipFile(folder / "meshes.npz", "w") as archive:
         for name in ("vertices", "faces", "frame_indices"):
             archive.writestr(f"{name}.npy", b"no array")
-    with pytest.raises(InputError, match="got no faces, frame_indices, vertices"):
+    with pytest.raises(InputError, match=r"meshes\.npz must be a complete, undamaged file"):
         ingest_meshes(open_scene(folder))
 
 
-def test_pickled_objects_are_never_loaded(folder):
+def test_objects_are_no_vertices(folder):
     np.savez(folder / "meshes.npz", vertices=np.array([{"a": 1}], object), faces=1, frame_indices=1)
-    with pytest.raises(InputError, match=r"plain arrays, got an archive with .* Python objects"):
+    with pytest.raises(InputError, match=r"must hold vertices, faces .*got no vertices"):
         ingest_meshes(open_scene(folder))
 
 
@@ -276,6 +266,53 @@ def test_positions_count_from_the_first_frame_of_the_video(folder, tmp_path, fac
     path = write_people(tmp_path / "vibe_output.pkl", {1: record})
     result = ingest_meshes(open_scene(folder), path, faces)
     assert result.meshes.frame_indices.tolist() == [30, 31, 32, 33, 34, 35]
+
+
+def cut_out_of_a_longer_source(folder, first: int, begins_at: int) -> None:
+    """The six frames are now ``first`` to ``first + 5`` of a source whose first one is given."""
+    for kind in ("frames", "masks"):
+        for camera in ("cam00", "cam01"):
+            where = folder / kind / camera
+            for number in reversed(range(6)):
+                (where / f"{number:06d}.png").rename(where / f"{number + first:06d}.png")
+    edit_description(folder, lambda d: d.update(source_begins_at=begins_at))
+
+
+@pytest.mark.parametrize(("first", "begins_at"), [(0, 0), (10, 0), (4, 1)])
+def test_an_estimate_of_the_whole_source_is_cut_to_the_clip(
+    folder, tmp_path, faces, first, begins_at
+):
+    cut_out_of_a_longer_source(folder, first, begins_at)
+    before, after = first - begins_at, 7
+    shown = [0] * before + [*range(6)] + [5] * after
+    record, places = weak_vibe(shown, default_recipe().cameras["cam00"])
+    record["verts"][before + 6 :] = np.nan  # Nothing outside the clip matters.
+    record["frame_ids"] = np.arange(len(shown))
+    path = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    result = ingest_meshes(open_scene(folder), path, faces)
+    assert result.meshes.frame_indices.tolist() == list(range(first, first + 6))
+    assert np.allclose(result.first_translations, places[before : before + 6], atol=1e-5)
+    [remark] = [said for said in result.warnings if "of the source" in said]
+    assert f"those of the clip, {first} to {first + 5}, are used" in remark
+
+
+def test_an_estimate_of_the_clip_alone_is_refused_until_its_place_is_told(folder, tmp_path, faces):
+    cut_out_of_a_longer_source(folder, 4, 0)
+    record, _ = weak_vibe(list(range(6)), default_recipe().cameras["cam00"])
+    path = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    with pytest.raises(InputError, match=r"meshes\.first_frame"):
+        ingest_meshes(open_scene(folder), path, faces)
+    placed = faces.model_copy(update={"first_frame": 4})
+    result = ingest_meshes(open_scene(folder), path, placed)
+    assert result.meshes.frame_indices.tolist() == list(range(4, 10))
+
+
+def test_an_estimate_of_another_part_of_the_source_is_refused(folder, tmp_path, faces):
+    cut_out_of_a_longer_source(folder, 40, 0)
+    record, _ = weak_vibe(list(range(6)), default_recipe().cameras["cam00"])
+    path = write_people(tmp_path / "vibe_output.pkl", {1: record})
+    with pytest.raises(InputError, match=r"clip's frames 40 to 45.*frames 0 to 5.*first_frame"):
+        ingest_meshes(open_scene(folder), path, faces)
 
 
 @pytest.mark.parametrize("frames", [range(5), range(7)])

@@ -158,3 +158,13 @@ def test_pares_network_saw_the_box_as_it_is(write, person, read, faces_file):
 def test_frames_before_the_tools_first_can_be_told(write, person, read, faces_file):
     estimate = read(write(vibe_record(person)), faces=faces_file, first_frame=100)
     assert estimate.frame_indices.tolist() == [100, 101, 102, 103]
+
+
+def test_boxes_of_followed_2d_poses_are_said_to_need_a_look(write, person, read, faces_file):
+    by_boxes = read(write(vibe_record(person)), faces=faces_file)
+    followed = vibe_record(person) | {"joints2d": np.zeros((len(person), 21, 3), np.float32)}
+    estimate = read(write(followed), faces=faces_file)
+    assert estimate.source == "VIBE"
+    assert np.allclose(placed(estimate), person.vertices, atol=2e-4)
+    assert any("another routine" in remark for remark in estimate.remarks)
+    assert not any("another routine" in remark for remark in by_boxes.remarks)

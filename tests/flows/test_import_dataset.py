@@ -8,11 +8,12 @@ import sys
 import pytest
 
 from flows.command_line import main
-from flows.imported_scene import import_key, scene_folder
+from flows.imported_scene import scene_folder, tell
 from flows.request import Request
 from mocoflow_core.capture.scene import open_scene
 from mocoflow_core.datasets.detect import detect_kind
-from mocoflow_core.datasets.import_dataset import configure
+from mocoflow_core.datasets.import_cache import import_key
+from mocoflow_core.datasets.import_dataset import ImportedDataset, configure
 from mocoflow_core.errors import InputError
 from tests.datasets.snapshot_layout import turning, write_snapshot
 from tests.small_smpl import write_smpl
@@ -80,6 +81,14 @@ def test_a_data_set_in_place_of_a_scene_is_imported_once(subject, capsys):
     scene_folder.cache_clear()
     assert scene_folder(subject, without_bodies=False) == first
     assert "imported before" in capsys.readouterr().err
+
+
+def test_warnings_of_evaluation_cameras_are_counted_and_not_printed(capsys):
+    tell(ImportedDataset("s", "front", (), {}, ("front is dark",), ("side: overlap 0.3",)))
+    printed = capsys.readouterr().err
+    assert "front is dark" in printed
+    assert "0.3" not in printed
+    assert "1 of evaluation cameras" in printed
 
 
 def test_a_changed_file_or_choice_is_another_import(subject):

@@ -24,6 +24,7 @@ RUN = {
     "scene": "turn <script>",
     "preset": "toy",
     "seed": 3,
+    "remarks": ["its bodies were fitted to all views"],
     "configuration": {"sampling": {"rays": 64}},
     "machine": {"cores": 2, "threads": 1},
     "stages": [
@@ -148,6 +149,7 @@ def test_every_part_of_a_whole_run_is_on_the_page(inputs: ReportInputs, tmp_path
     page = page_of(inputs, tmp_path)
     for text in (
         "seed 3",
+        "its bodies were fitted to all views",
         "cam00, held-out frames",
         "crop 60 px",
         "the meshes bring a location",

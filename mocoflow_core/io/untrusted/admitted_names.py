@@ -54,6 +54,7 @@ def _ordered_dict(arguments: Sequence[object], machine: Machine) -> dict[object,
     (pairs,) = arguments or ([],)
     if not isinstance(pairs, list):
         raise damaged("an OrderedDict that is not made of pairs")
+    machine.allowance.spend_step(len(pairs))
     result: dict[object, object] = {}
     for pair in pairs:
         key, value = pair if isinstance(pair, list | tuple) else ()
@@ -77,6 +78,7 @@ def _latin1(arguments: Sequence[object], machine: Machine) -> bytes:
     text, codec = arguments
     if not isinstance(text, str) or codec not in ("latin1", "latin-1"):
         raise forbidden("_codecs.encode with another codec than latin1")
+    machine.allowance.spend_copy(len(text))
     return text.encode("latin1")
 
 
@@ -92,6 +94,7 @@ def _items(arguments: Sequence[object], machine: Machine) -> list[object]:
     (items,) = arguments or ([],)
     if not isinstance(items, list | tuple):
         raise damaged("a set that is not made of a list")
+    machine.allowance.spend_step(len(items))
     return list(items)
 
 

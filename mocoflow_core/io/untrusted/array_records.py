@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.untrusted.byte_stream import ByteStream
 from mocoflow_core.io.untrusted.limits import Allowance
 from mocoflow_core.io.untrusted.records import Admitted, Machine, Record, integers, latin1_bytes
 from mocoflow_core.io.untrusted.refusal import damaged
 
 NDARRAY = Admitted("numpy.ndarray")
 
-_NUMBER = re.compile(r"[<>=|]?(b1|[iu][1248]|f[248]|c8|c16|[SU][1-9]\d{0,8})")
+_NUMBER = re.compile(r"[<>=|]?(b1|[iu][1248]|f[248]|c8|c16|[SU][1-9]\d{0,7})")
 _OBJECT = re.compile(r"[<>=|]?O[48]?")
 _BYTE_ORDERS = ("<", ">", "=", "|")
 
@@ -72,7 +71,7 @@ class DtypeRecord(Record):
             )
         return self.dtype
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         if not isinstance(state, tuple) or not 5 <= len(state) <= 9:
             raise damaged("a type with a strange state")
         order, subarray, names, fields = state[1:5]
@@ -100,7 +99,7 @@ class ArrayRecord(Record):
         self.value: object = None
         self._built = False
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         if not isinstance(state, tuple) or len(state) != 5 or self._built:
             raise damaged("an array with a strange state")
         _, shape, dtype, fortran, content = state
@@ -108,9 +107,10 @@ class ArrayRecord(Record):
             raise damaged("an array without a type")
         order = "F" if fortran else "C"
         if dtype.dtype is None:
-            self.value = nested(content, integers(shape, 16))
+            self.value = nested(content, integers(shape, 16), machine.allowance)
         else:
-            self.value = array_of(latin1_bytes(content), dtype.dtype, shape, order)
+            data = latin1_bytes(content)
+            self.value = array_of(data, dtype.dtype, shape, order, machine.allowance)
         self._built = True
 
     def plain(self, allowance: Allowance) -> object:
@@ -120,11 +120,11 @@ class ArrayRecord(Record):
 
 
 def array_of(
-    data: bytes | bytearray, dtype: np.dtype, shape: object, order: str
+    data: bytes | bytearray, dtype: np.dtype, shape: object, order: str, allowance: Allowance
 ) -> NDArray[np.generic]:
-    """A new array with the given raw bytes."""
+    """A new array with the given raw bytes, which may be the content of many others too."""
     sizes = integers(shape, 16)
-    require_bytes(sizes, dtype.itemsize, len(data))
+    allowance.spend_copy(require_bytes(sizes, dtype.itemsize, len(data)))
     # A copy: writable, aligned, and free of the file's buffer.
     array = np.empty(math.prod(sizes), dtype)
     if array.nbytes:
@@ -144,7 +144,7 @@ def shaped(array: NDArray[np.generic], shape: tuple[int, ...], order: str) -> ND
     return array.reshape(shape)
 
 
-def nested(content: object, shape: tuple[int, ...]) -> object:
+def nested(content: object, shape: tuple[int, ...], allowance: Allowance) -> object:
     """The items of an object array as nested lists, or the one item of an array without axes.
 
     NumPy writes them in the order of C, whatever the order of the array.
@@ -153,15 +153,18 @@ def nested(content: object, shape: tuple[int, ...]) -> object:
         raise damaged("an array of objects with a strange number of them")
     if not shape:
         return content[0]
-    if len(shape) == 1:
-        return list(content)
-    return _picked(content, np.arange(len(content)).reshape(shape))
+    allowance.spend_step(len(content))
+    return _picked(content, np.arange(len(content)).reshape(shape), allowance)
 
 
-def _picked(content: list[object], positions: NDArray[np.generic]) -> list[object]:
+def _picked(
+    content: list[object], positions: NDArray[np.generic], allowance: Allowance
+) -> list[object]:
+    # An axis of length zero makes lists without end out of nothing: each of them is counted.
+    allowance.spend_step()
     if positions.ndim == 1:
         return [content[int(p)] for p in positions]
-    return [_picked(content, row) for row in positions]
+    return [_picked(content, row, allowance) for row in positions]
 
 
 def reconstruct(arguments: Sequence[object], machine: Machine) -> ArrayRecord:
@@ -184,7 +187,9 @@ def scalar(arguments: Sequence[object], machine: Machine) -> object:
     kind, data = arguments
     if not isinstance(kind, DtypeRecord):
         raise damaged("a number without a type")
-    return array_of(latin1_bytes(data), kind.numeric, (), "C").item()
+    raw = latin1_bytes(data)
+    machine.allowance.spend_copy(len(raw))
+    return array_of(raw, kind.numeric, (), "C", machine.allowance).item()
 
 
 def from_buffer(arguments: Sequence[object], machine: Machine) -> NDArray[np.generic]:
@@ -192,7 +197,7 @@ def from_buffer(arguments: Sequence[object], machine: Machine) -> NDArray[np.gen
     data, kind, shape, order, *axes = arguments
     if not isinstance(kind, DtypeRecord) or order not in ("C", "F", "K") or len(axes) > 1:
         raise damaged("an array that is not made as NumPy makes it")
-    array = array_of(latin1_bytes(data), kind.numeric, shape, order)
+    array = array_of(latin1_bytes(data), kind.numeric, shape, order, machine.allowance)
     if order == "K" and axes and axes[0] is not None:
         return array.transpose(integers(axes[0], 16))
     return array

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.untrusted.array_records import ArrayRecord
-from mocoflow_core.io.untrusted.byte_stream import ByteStream
 from mocoflow_core.io.untrusted.limits import Allowance
-from mocoflow_core.io.untrusted.records import Record, integers
+from mocoflow_core.io.untrusted.records import Machine, Record, integers
 from mocoflow_core.io.untrusted.refusal import damaged
+
+_ENTRY_BYTES = 16  # row and column while an entry finds its place
 
 
 class StateRecord(Record):
@@ -22,7 +23,7 @@ class StateRecord(Record):
     def __init__(self) -> None:
         self._state: dict[object, object] | None = None
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         if not isinstance(state, dict) or self._state is not None:
             raise damaged("an object with a strange state")
         self._state = state
@@ -39,7 +40,7 @@ class SparseColumnsRecord(Record):
         self._state: dict[object, object] = {}
         self._dense: NDArray[np.generic] | None = None
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         if not isinstance(state, dict) or self._state:
             raise damaged("a sparse matrix with a strange state")
         self._state = state
@@ -56,19 +57,20 @@ class SparseColumnsRecord(Record):
         data, indices, pointers = (
             self._vector(name, allowance) for name in ("data", "indices", "indptr")
         )
-        starts: NDArray[np.int64] = pointers.astype(np.int64)
-        if data.dtype.kind not in "fiub" or indices.dtype.kind not in "iu":
+        whole = indices.dtype.kind in "iu" and pointers.dtype.kind in "iu"
+        if data.dtype.kind not in "fiub" or not whole:
             raise damaged("a sparse matrix that is not made of numbers")
+        starts: NDArray[np.int64] = pointers.astype(np.int64)
         if len(starts) != shape[1] + 1 or len(data) != len(indices):
             raise damaged("a sparse matrix whose parts disagree")
-        counts = starts[1:] - starts[:-1]
         if len(indices) and not 0 <= indices.min() <= indices.max() < shape[0]:
             raise damaged("a sparse matrix with an entry outside")
-        if starts[0] != 0 or starts[-1] != len(data) or (counts < 0).any():
+        # Compared, not subtracted: differences of such numbers can wrap round to harmless ones.
+        if starts[0] != 0 or starts[-1] != len(data) or (starts[1:] < starts[:-1]).any():
             raise damaged("a sparse matrix whose columns are out of order")
-        allowance.spend_bytes(shape[0] * shape[1] * data.dtype.itemsize)
+        allowance.spend_bytes(shape[0] * shape[1] * data.dtype.itemsize + _ENTRY_BYTES * len(data))
         dense = np.zeros(shape, data.dtype)
-        columns = np.repeat(np.arange(shape[1]), counts)
+        columns = np.repeat(np.arange(shape[1]), np.diff(starts))
         np.add.at(dense, (indices, columns), data)  # type: ignore[arg-type]
         return dense
 

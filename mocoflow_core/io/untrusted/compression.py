@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import io
 import lzma
 import zlib
 from collections.abc import Callable
@@ -13,6 +14,8 @@ from mocoflow_core.io.untrusted.limits import Allowance
 from mocoflow_core.io.untrusted.refusal import damaged
 
 _CHUNK = 2**20
+# Unpacked bytes are held, and taken out once more by whoever reads them.
+_HELD = 2
 # A dictionary larger than that of xz -9 asks for memory before it gives any data.
 _LZMA_MEMORY = 2**27
 
@@ -72,13 +75,14 @@ def unpacked(stream: ByteStream, start: bytes, allowance: Allowance) -> ByteStre
         InputError: it grows beyond the limits, is damaged or cut short.
     """
     unpacker = next(make for magic, make in _UNPACKERS.items() if start.startswith(magic))()
-    content = bytearray()
+    content = io.BytesIO()
     while not unpacker.eof:
         packed = stream.take(min(_CHUNK, stream.remaining))
         piece = unpacker.pull(packed, _CHUNK)
         if not piece and not packed and not unpacker.eof:
             raise damaged("a compressed file that ends too early")
-        content += piece
-        allowance.spend_bytes(len(piece))
-        allowance.require_growth(stream.size, len(content))
-    return ByteStream.over(bytes(content))
+        allowance.spend_bytes(_HELD * len(piece))
+        content.write(piece)
+    size = content.tell()
+    content.seek(0)
+    return ByteStream(content, size)

@@ -45,7 +45,7 @@ def read_untrusted(path: Path, limits: Limits = DEFAULT_LIMITS) -> object:
     require_file(path)
     with naming(path):
         start = _start(path)
-        allowance = Allowance(limits)
+        allowance = _allowance(path, limits)
         if start.startswith(hdf5_file.MAGIC):
             return hdf5_file.read_datasets(path, allowance)
         if start.startswith(_ZIP_MAGIC):
@@ -58,14 +58,14 @@ def read_pickle(path: Path, limits: Limits = DEFAULT_LIMITS) -> object:
     """A pickle of any protocol, Python 2's too; returns and raises as ``read_untrusted`` does."""
     require_file(path)
     with naming(path), opened(path) as stream:
-        return read_pickle_stream(stream, Allowance(limits))
+        return read_pickle_stream(stream, _allowance(path, limits))
 
 
 def read_joblib(path: Path, limits: Limits = DEFAULT_LIMITS) -> object:
     """A joblib file, compressed or not; returns and raises as ``read_untrusted`` does."""
     require_file(path)
     with naming(path), opened(path) as stream:
-        start, allowance = _start(path), Allowance(limits)
+        start, allowance = _start(path), _allowance(path, limits)
         if is_compressed(start):
             stream = unpacked(stream, start, allowance)
         return read_pickle_stream(stream, allowance)
@@ -75,14 +75,14 @@ def read_npy(path: Path, limits: Limits = DEFAULT_LIMITS) -> object:
     """An ``.npy`` file, with objects too; returns and raises as ``read_untrusted`` does."""
     require_file(path)
     with naming(path), opened(path) as stream:
-        return numpy_files.read_npy_stream(stream, Allowance(limits))
+        return numpy_files.read_npy_stream(stream, _allowance(path, limits))
 
 
 def read_npz(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, object]:
     """An ``.npz`` archive; returns and raises as ``read_untrusted`` does."""
     require_file(path)
     with naming(path):
-        return numpy_files.read_npz_file(path, Allowance(limits))
+        return numpy_files.read_npz_file(path, _allowance(path, limits))
 
 
 def read_torch(path: Path, limits: Limits = DEFAULT_LIMITS) -> object:
@@ -90,9 +90,9 @@ def read_torch(path: Path, limits: Limits = DEFAULT_LIMITS) -> object:
     require_file(path)
     with naming(path):
         if _start(path).startswith(_ZIP_MAGIC):
-            return torch_archive.read_torch_zip(path, Allowance(limits))
+            return torch_archive.read_torch_zip(path, _allowance(path, limits))
         with opened(path) as stream:
-            return torch_archive.read_old_torch(stream, Allowance(limits))
+            return torch_archive.read_old_torch(stream, _allowance(path, limits))
 
 
 def read_hdf5(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, NDArray[np.generic]]:
@@ -104,14 +104,14 @@ def read_hdf5(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, NDArray[
     """
     require_file(path)
     with naming(path):
-        return hdf5_file.read_datasets(path, Allowance(limits))
+        return hdf5_file.read_datasets(path, _allowance(path, limits))
 
 
 def hdf5_shapes(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, ArrayShape]:
     """Shape and type of every data set, without its content; raises as ``read_hdf5`` does."""
     require_file(path)
     with naming(path):
-        return hdf5_file.read_shapes(path, Allowance(limits))
+        return hdf5_file.read_shapes(path, _allowance(path, limits))
 
 
 def hdf5_rows(
@@ -124,7 +124,11 @@ def hdf5_rows(
     """
     require_file(path)
     with naming(path):
-        yield from hdf5_file.read_rows(path, name, rows, Allowance(limits))
+        yield from hdf5_file.read_rows(path, name, rows, _allowance(path, limits))
+
+
+def _allowance(path: Path, limits: Limits) -> Allowance:
+    return Allowance(limits, path.stat().st_size)
 
 
 def _start(path: Path) -> bytes:

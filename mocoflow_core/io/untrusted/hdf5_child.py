@@ -98,10 +98,11 @@ def _require_plain(name: str, dataset: h5py.Dataset) -> None:
     filters = [creation.get_filter(i)[0] for i in range(creation.get_nfilters())]
     unknown = [number for number in filters if number not in KNOWN_FILTERS]
     found = None
-    if dataset.shape is None or dataset.dtype.kind not in NUMBERS_AND_TEXT:
-        found = f"values of type {str(dataset.dtype)[:80]!r}"
-    elif creation.get_layout() == h5py.h5d.VIRTUAL or creation.get_external_count():
+    # First of all: even the shape of a virtual data set may be a matter of the files it names.
+    if creation.get_layout() == h5py.h5d.VIRTUAL or creation.get_external_count():
         found = "data in other files"
+    elif dataset.shape is None or dataset.dtype.kind not in NUMBERS_AND_TEXT:
+        found = f"values of type {str(dataset.dtype)[:80]!r}"
     elif unknown:
         found = f"an unknown filter {unknown[0]}"
     elif dataset.chunks and _chunk_bytes(dataset) > max(dataset.nbytes, SMALLEST_CHUNK_BYTES):

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Timer
 from typing import BinaryIO
 
 import numpy as np
@@ -76,18 +77,58 @@ def read_rows(
             if described is None:
                 raise damaged(f"no row {row} in {name!r}")
             # One row at a time is in memory: it is not counted against the whole file.
-            yield _content(answers, described[1], Allowance(allowance.limits))
+            yield _content(answers, described[1], Allowance(allowance.limits, allowance.file_bytes))
+
+
+class _Answers:
+    """What the reading process says; one that is silent for too long is stopped.
+
+    Its own bound counts computing alone: a file that makes it wait would not end otherwise.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], output: BinaryIO, seconds: int) -> None:
+        self._process = process
+        self._output = output
+        self._seconds = seconds
+
+    def line(self) -> bytes:
+        with self._patience():
+            return self._output.readline(_LONGEST_LINE)
+
+    def fill(self, target: memoryview) -> None:
+        done = 0
+        while done < target.nbytes:
+            with self._patience():
+                count = self._output.readinto(target[done:])  # type: ignore[attr-defined]
+            if not count:
+                raise damaged("an HDF5 file that cannot be read to its end")
+            done += count
+
+    def require_end(self) -> None:
+        with self._patience():
+            status = self._process.wait()
+        if status != 0:
+            raise damaged("an HDF5 file that cannot be read to its end")
+
+    @contextmanager
+    def _patience(self) -> Iterator[None]:
+        timer = Timer(self._seconds, self._process.kill)
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
 
 
 @contextmanager
 def _answers(
     path: Path, allowance: Allowance, name: str | None, rows: Sequence[int] | None, content: bool
-) -> Iterator[BinaryIO]:
+) -> Iterator[_Answers]:
     request = {
         "path": str(path.absolute()),
         "name": name,
         "rows": None if rows is None else [int(row) for row in rows],
-        "bytes": allowance.limits.made_bytes if content else 0,
+        "bytes": allowance.left_bytes if content else 0,
         "seconds": allowance.limits.seconds,
         "members": allowance.limits.members,
     }
@@ -104,17 +145,17 @@ def _answers(
     try:
         process.stdin.write(json.dumps(request).encode() + b"\n")
         process.stdin.close()
-        yield process.stdout  # type: ignore[misc]
-        if process.wait() != 0:
-            raise damaged("an HDF5 file that cannot be read to its end")
+        answers = _Answers(process, process.stdout, allowance.limits.seconds)  # type: ignore[arg-type]
+        yield answers
+        answers.require_end()
     finally:
         process.kill()
         process.stdout.close()
         process.wait()
 
 
-def _described(answers: BinaryIO, allowance: Allowance) -> tuple[str, ArrayShape] | None:
-    line = answers.readline(_LONGEST_LINE)
+def _described(answers: _Answers, allowance: Allowance) -> tuple[str, ArrayShape] | None:
+    line = answers.line()
     if not line:
         return None
     answer = json.loads(line)
@@ -130,15 +171,9 @@ def _described(answers: BinaryIO, allowance: Allowance) -> tuple[str, ArrayShape
     return str(answer["name"]), ArrayShape(shape, dtype)
 
 
-def _content(answers: BinaryIO, expected: ArrayShape, allowance: Allowance) -> NDArray[np.generic]:
+def _content(answers: _Answers, expected: ArrayShape, allowance: Allowance) -> NDArray[np.generic]:
     allowance.spend_bytes(expected.nbytes)
     array = np.empty(expected.shape, expected.dtype)
     if array.nbytes:
-        target = memoryview(array.reshape(-1).view(np.uint8))  # type: ignore[arg-type]
-        done = 0
-        while done < target.nbytes:
-            count = answers.readinto(target[done:])  # type: ignore[attr-defined]
-            if not count:
-                raise damaged("an HDF5 file that cannot be read to its end")
-            done += count
+        answers.fill(memoryview(array.reshape(-1).view(np.uint8)))  # type: ignore[arg-type]
     return native(array)

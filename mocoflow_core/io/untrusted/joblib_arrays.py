@@ -19,9 +19,8 @@ from mocoflow_core.io.untrusted.array_records import (
     require_bytes,
     shaped,
 )
-from mocoflow_core.io.untrusted.byte_stream import ByteStream
 from mocoflow_core.io.untrusted.limits import Allowance
-from mocoflow_core.io.untrusted.records import Record, integers
+from mocoflow_core.io.untrusted.records import Machine, Record, integers
 from mocoflow_core.io.untrusted.refusal import damaged
 
 WRAPPER = "joblib.numpy_pickle.NumpyArrayWrapper"
@@ -33,12 +32,13 @@ class WrapperRecord(Record):
     def __init__(self) -> None:
         self._array: NDArray[np.generic] | None = None
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         if not isinstance(state, dict) or self._array is not None:
             raise damaged("an array with a strange state")
         kind = state.get("dtype")
         if state.get("subclass") is not NDARRAY or not isinstance(kind, DtypeRecord):
             raise damaged("an array of a strange class or without a type")
+        stream = machine.stream
         dtype, shape = kind.numeric, integers(state.get("shape"), 16)
         # Since joblib 1.2 the data is aligned: a byte says how many fill bytes follow.
         if state.get("numpy_array_alignment_bytes") is not None:

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocoflow_core.errors import InputError
-from mocoflow_core.io.untrusted.limits import Allowance, Limits, too_many_items
+from mocoflow_core.io.untrusted.limits import CONTAINER_BYTES, Allowance, Limits, too_many_items
 from mocoflow_core.io.untrusted.records import Admitted, Record
 from mocoflow_core.io.untrusted.refusal import damaged
 
 _LEAVES = (str, bytes, int, float, complex, type(None))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Made:
     source: object  # kept alive: its id is the key under which this is found
     value: object
@@ -49,6 +49,8 @@ def plain_tree(root: object, allowance: Allowance) -> object:
         missing = [child for child in _children(value, allowance) if id(child) not in made]
         if missing and id(value) in begun:
             raise damaged("a structure that holds itself")
+        if id(value) not in begun:
+            allowance.spend_bytes(CONTAINER_BYTES)
         begun.add(id(value))
         if missing:
             waiting.extend(missing)

@@ -20,7 +20,7 @@ class Record(ABC):
     """
 
     @abstractmethod
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         """Note the state that the file gives the object."""
 
     @abstractmethod
@@ -32,9 +32,10 @@ Outside = Callable[[object], object]  # resolves a reference to data outside of 
 
 
 class Machine(Protocol):
-    """What a call may use of the machine that reads the file."""
+    """What an object under construction may use of the machine that reads the file."""
 
     allowance: Allowance
+    stream: ByteStream
 
     def nested(self, stream: ByteStream, outside: Outside | None) -> object:
         """What another pickle holds, under the same allowance."""

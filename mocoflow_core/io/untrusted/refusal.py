@@ -21,6 +21,7 @@ _DAMAGE = (
     LookupError,
     OSError,
     RuntimeError,
+    TypeError,
     ValueError,
     lzma.LZMAError,
     struct.error,

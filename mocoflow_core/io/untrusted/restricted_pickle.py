@@ -41,7 +41,7 @@ class PickleMachine:
     def __init__(
         self, stream: ByteStream, allowance: Allowance, outside: Outside | None = None
     ) -> None:
-        self._stream = stream
+        self.stream = stream
         self.allowance = allowance
         self._outside = outside  # resolves references to data outside of the pickle
         self._stack: list[object] = []
@@ -50,13 +50,13 @@ class PickleMachine:
 
     def run(self) -> object:
         """Follow the instructions up to STOP."""
-        take, spend = self._stream.take, self.allowance.spend_step
+        take, spend = self.stream.take, self.allowance.spend_step
         while True:
             spend()
             code = take(1)
             literal = LITERALS.get(code)
             if literal is not None:
-                self._stack.append(literal(self._stream))
+                self._stack.append(literal(self.stream))
             elif code == b".":
                 return self._result()
             else:
@@ -104,21 +104,21 @@ class PickleMachine:
         self._stack.append(self._stack[-1])
 
     def _put(self, width: int) -> None:
-        self._memo[memo_place(self._stream, width)] = self._stack[-1]
+        self._memo[memo_place(self.stream, width)] = self._stack[-1]
 
     def _get(self, width: int) -> None:
-        self._stack.append(self._memo[memo_place(self._stream, width)])
+        self._stack.append(self._memo[memo_place(self.stream, width)])
 
     def _memoise(self) -> None:
         self._memo[len(self._memo)] = self._stack[-1]
 
     def _protocol(self) -> None:
-        if self._stream.take(1)[0] > _NEWEST_PROTOCOL:
+        if self.stream.take(1)[0] > _NEWEST_PROTOCOL:
             raise damaged("a pickle of an unknown protocol")
 
     def _frame(self) -> None:
         # A hint for reading ahead; every length is checked where it counts.
-        self._stream.take(8)
+        self.stream.take(8)
 
     # Containers
 
@@ -163,7 +163,7 @@ class PickleMachine:
     # Names and objects
 
     def _global(self) -> None:
-        module, name = (self._stream.line().decode("utf-8") for _ in range(2))
+        module, name = (self.stream.line().decode("utf-8") for _ in range(2))
         self._stack.append(admitted(module, name))
 
     def _stack_global(self) -> None:
@@ -190,10 +190,10 @@ class PickleMachine:
         state, target = self._stack.pop(), self._stack[-1]
         if not isinstance(target, Record):
             raise damaged("a state for something that has none")
-        target.build(state, self._stream)
+        target.build(state, self)
 
     def _instance(self) -> None:
-        module, name = (self._stream.line().decode("utf-8") for _ in range(2))
+        module, name = (self.stream.line().decode("utf-8") for _ in range(2))
         raise forbidden(f"{module}.{name}")
 
     def _refer(self) -> None:

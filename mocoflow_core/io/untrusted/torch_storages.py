@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mocoflow_core.io.untrusted.byte_stream import ByteStream
 from mocoflow_core.io.untrusted.limits import Allowance, OwnBytes
-from mocoflow_core.io.untrusted.records import Admitted, Record, integers
+from mocoflow_core.io.untrusted.records import Admitted, Machine, Record, integers
 from mocoflow_core.io.untrusted.refusal import damaged
 
 # NumPy has no bfloat16: its two bytes are the upper half of a float32.
@@ -56,7 +55,7 @@ class Storage(Record):
             raise damaged(f"a tensor without its {self.nbytes:,} bytes")
         return np.frombuffer(self.data, self.stored)
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         raise damaged("a tensor with a strange state")
 
     def plain(self, allowance: Allowance) -> object:

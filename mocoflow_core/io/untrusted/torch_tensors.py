@@ -31,7 +31,7 @@ class TensorRecord(Record):
         self._offset, self._size, self._stride = offset, size, stride
         self._array: NDArray[np.generic] | None = None
 
-    def build(self, state: object, stream: ByteStream) -> None:
+    def build(self, state: object, machine: Machine) -> None:
         raise damaged("a tensor with a strange state")
 
     def plain(self, allowance: Allowance) -> object:
@@ -70,7 +70,10 @@ def _rebuild_tensor(arguments: Sequence[object], machine: Machine) -> TensorReco
 def _load_from_bytes(arguments: Sequence[object], machine: Machine) -> Storage:
     """``torch.storage._load_from_bytes(bytes)``: a whole torch file that holds one storage."""
     (data,) = arguments
-    value = read_torch_stream(ByteStream.over(bytes(latin1_bytes(data))), machine.nested)
+    whole = bytes(latin1_bytes(data))
+    # Its bytes and the tensor made of them, once more for each call.
+    machine.allowance.spend_copy(2 * len(whole))
+    value = read_torch_stream(ByteStream.over(whole), machine.nested)
     if not isinstance(value, Storage):
         raise damaged("a tensor without its data")
     return value

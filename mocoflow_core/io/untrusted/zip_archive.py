@@ -23,7 +23,6 @@ class ZipArchive:
     def __init__(self, archive: zipfile.ZipFile, size: int, allowance: Allowance) -> None:
         self._archive = archive
         self._allowance = allowance
-        self._size = size
         self._own = OwnBytes(size)
         members = archive.infolist()
         if len(members) > allowance.limits.members:
@@ -47,9 +46,8 @@ class ZipArchive:
         member = self._members.get(name)
         if member is None:
             raise damaged(f"an archive without {name[:120]!r}")
-        packed = min(member.compress_size, self._size)
-        self._allowance.require_growth(packed, member.file_size)
-        self._allowance.spend_bytes(self._own.beyond(member.file_size))
+        # The entry, and the array that is made of it.
+        self._allowance.spend_bytes(2 * self._own.beyond(member.file_size))
         with self._archive.open(member) as file:
             # One byte more, to meet a member that is longer than it says.
             data = file.read(member.file_size + 1)

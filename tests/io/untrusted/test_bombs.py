@@ -162,14 +162,14 @@ def test_a_memo_place_far_out_takes_no_memory(tmp_path):
     ],
 )
 def test_compressed_files_that_grow_without_end(refused, pack):
-    refused(pack(bytes(6 * MEGABYTE)), "grow beyond")
+    refused(pack(bytes(6 * MEGABYTE)), "must fit into")
 
 
 def test_archives_that_grow_without_end(refused):
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.npy", bytes(6 * MEGABYTE))
-    refused(file.getvalue(), "bytes that grow beyond")
+    refused(file.getvalue(), "must fit into")
 
 
 def test_what_lies_in_a_file_as_it_is_may_be_larger_than_what_is_made(tmp_path):
@@ -253,6 +253,76 @@ def test_sparse_matrices_that_would_be_vast(refused):
         {"data": 1},
     ):
         refused(python2_pickle(Forged("scipy.sparse.csc", "csc_matrix", SPARSE | fault)))
+
+
+def test_sparse_columns_whose_differences_wrap_round(refused):
+    far = {"indptr": np.array([0, 2**62, -(2**63), -(2**62), 3]), "_shape": (2, 4)}
+    refused(python2_pickle(Forged("scipy.sparse.csc", "csc_matrix", SPARSE | far)), "out of order")
+    fractions = {"indptr": np.array([0.0, 1.0, np.nan, 3.0])}
+    refused(python2_pickle(Forged("scipy.sparse.csc", "csc_matrix", SPARSE | fractions)))
+
+
+@pytest.mark.parametrize("rows", [10**6, 2**40])
+def test_arrays_of_objects_that_are_rows_of_nothing(refused, rows):
+    shape = pickle.dumps(rows, 2)[2:-1]
+    array = b"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(K\x00tU\x01btR"
+    state = b"(K\x01(" + shape + b"K\x00tcnumpy\ndtype\n(U\x01OtR\x89]tb"
+    refused(b"\x80\x02" + array + state + b".", "must fit into")
+
+
+TYPE = b"cnumpy\ndtype\n(U\x02u1tRq\x02"
+SIZE = b"J" + MEGABYTE.to_bytes(4, "little")
+STATE = b"(K\x01(" + SIZE + b"tcnumpy\ndtype\n(U\x02u1tR\x89h\x01t"
+EMPTY = b"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(K\x00tU\x01btR"
+
+
+@pytest.mark.parametrize(
+    "again",
+    [
+        b"cnumpy._core.numeric\n_frombuffer\n(h\x01h\x02(" + SIZE + b"tU\x01CtR",
+        b"ctorch.storage\n_load_from_bytes\n(h\x03tR",
+        b"c_codecs\nencode\n(h\x04U\x06latin1tR",
+        b"c__builtin__\nset\n(h\x05tR",
+        b"ccollections\nOrderedDict\n(h\x06tR",
+        EMPTY + b"h\x07b",
+    ],
+)
+def test_bytes_and_lists_that_are_copied_again_and_again(refused, again):
+    tensor = io.BytesIO()
+    torch.save(torch.zeros(MEGABYTE // 4).storage(), tensor, _use_new_zipfile_serialization=False)
+    kept = (
+        b"B" + MEGABYTE.to_bytes(4, "little") + bytes(MEGABYTE) + b"q\x010",
+        TYPE + b"0",
+        b"B" + len(tensor.getvalue()).to_bytes(4, "little") + tensor.getvalue() + b"q\x030",
+        b"X" + MEGABYTE.to_bytes(4, "little") + bytes(MEGABYTE) + b"q\x040",
+        b"(" + b"N" * 20_000 + b"lq\x050",
+        b"(" + b"(U\x01aNl" * 5_000 + b"lq\x060",
+        STATE + b"q\x070",
+    )
+    data = b"\x80\x02" + b"".join(kept) + b"(" + again * 400 + b"l."
+    refused(data, "must fit into|at most 100,000 items")
+
+
+def test_numbers_of_an_array_that_share_their_bytes(refused):
+    wide = b"cnumpy\ndtype\n(U\x08S1048576tRq\x02"
+    blob = b"B" + MEGABYTE.to_bytes(4, "little") + b"a" * MEGABYTE + b"q\x010"
+    number = b"cnumpy.core.multiarray\nscalar\n(h\x02h\x01tR"
+    refused(b"\x80\x02" + blob + wide + b"0(" + number * 400 + b"l.", "must fit into")
+
+
+@pytest.mark.parametrize("kind", [b"U999999999", b"S999999999"])
+def test_types_wider_than_numpy_has(refused, kind):
+    refused(b"\x80\x02cnumpy\ndtype\n(U" + bytes([len(kind)]) + kind + b"tR.", "numbers or text")
+    text = b"{'descr': '<" + kind + b"', 'fortran_order': False, 'shape': (0,), }\n"
+    refused(b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text, "numbers or text")
+
+
+@pytest.mark.parametrize("item", [b"]", b"}", b"\x94", b"]\x85"])
+def test_memory_for_items_grows_with_the_file(refused, item):
+    # By default: a small file may hold no more than a large one could.
+    mark, close = (b"N", b".") if item == b"\x94" else (b"(", b"l.")
+    limits = Limits(free_growth_bytes=2 * MEGABYTE, steps=100_000)
+    refused(b"\x80\x04" + mark + item * (40_000 // len(item)) + close, "must fit into", limits)
 
 
 def test_hdf5_data_that_would_be_vast(refused, tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import h5py
 import numpy as np
 import pytest
@@ -46,6 +48,15 @@ def _virtual(file, secret):
     file.create_virtual_dataset("a", layout)
 
 
+def _virtual_without_end(file, secret):
+    # Who asks for its shape opens the source, and whoever opens that one waits for ever.
+    os.mkfifo(secret.with_suffix(".hdf5"))
+    layout = h5py.VirtualLayout((4,), "u1", maxshape=(None,))
+    source = h5py.VirtualSource(str(secret.with_suffix(".hdf5")), "a", (4,), maxshape=(None,))
+    layout[: h5py.h5s.UNLIMITED] = source[: h5py.h5s.UNLIMITED]
+    file.create_virtual_dataset("a", layout)
+
+
 def _text_of_any_length(file, secret):
     file["a"] = ["one", "another"]
 
@@ -81,6 +92,7 @@ HOSTILE = [
     _dangling_link,
     _other_file,
     _virtual,
+    _virtual_without_end,
     _text_of_any_length,
     _lists_of_any_length,
     _references,
@@ -97,7 +109,7 @@ def test_what_is_no_plain_data_is_refused(tmp_path, secret, write):
     with h5py.File(path, "w") as file:
         write(file, secret)
     with pytest.raises(InputError, match=r"file\.hdf5 must hold .*'(a|b)"):
-        read_hdf5(path)
+        read_hdf5(path, Limits(seconds=10))
 
 
 def test_shapes_and_rows_follow_no_links_either(tmp_path, secret):
@@ -128,6 +140,8 @@ def test_a_reading_process_that_dies_or_hangs_is_an_error(tmp_path, monkeypatch)
     endings = {
         "dies": "import os; os.abort()",
         "hangs": "import resource as r; r.setrlimit(r.RLIMIT_CPU, (1, 1))\nwhile True: pass",
+        "waits": "import time; time.sleep(60)",
+        "lingers": "import os, time; os.close(1); time.sleep(60)",
         "babbles": "print('no json')",
         "counts": "print(1)",
         "lies": 'print(\'{"name": "a", "dtype": "<f8", "shape": [4]}\')',
@@ -139,4 +153,4 @@ def test_a_reading_process_that_dies_or_hangs_is_an_error(tmp_path, monkeypatch)
         program.write_text(code)
         monkeypatch.setattr(hdf5_file, "_PROGRAM", program)
         with pytest.raises(InputError):
-            read_hdf5(path, Limits(made_bytes=2**20))
+            read_hdf5(path, Limits(made_bytes=2**20, seconds=1))

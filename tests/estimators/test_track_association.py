@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocoflow_core.estimators.people_in_time import LONGEST_ABSENCE, follow_people
+from mocoflow_core.estimators.track_association import LONGEST_ABSENCE, follow_people
 
 
 def crossing(frames=20):

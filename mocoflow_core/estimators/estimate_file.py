@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from mocoflow_core.body.mesh_file import MESH_SUFFIXES
 from mocoflow_core.errors import InputError
-from mocoflow_core.estimators.mesh_file import MESH_SUFFIXES
 from mocoflow_core.io.untrusted import read_untrusted
 
 FOLDER_SUFFIXES = (".npy", ".npz", ".json", *MESH_SUFFIXES)
@@ -22,7 +22,7 @@ HIGHEST = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
-class Stored:
+class EstimateFile:
     """The path of an estimate. Its content is read once, and never runs anything."""
 
     path: Path
@@ -119,7 +119,7 @@ def people_of(content: object) -> dict[int, Mapping[str, object]]:
     return people
 
 
-def what_is_in(stored: Stored) -> str:
+def what_is_in(stored: EstimateFile) -> str:
     """A line for people: names of keys or files, the first few."""
     if stored.is_folder:
         names = [file.name for file in sorted(stored.path.iterdir())]

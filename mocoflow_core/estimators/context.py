@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_faces import read_faces
-from mocoflow_core.body.smpl_file import SMPL_URL, SMPLX_URL, WITHOUT_MODEL, read_smpl_model
+from mocoflow_core.body.smpl_file import Family, missing_model, read_smpl_model, where_to_get
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.io.untrusted import read_npz
 
-# What tools' bodies are made of: joints of the model, and where users get it.
-MODELS = {"SMPL": (24, SMPL_URL), "SMPL-X": (55, SMPLX_URL)}
+# What tools' bodies are made of, told by its joints.
+JOINTS: dict[Family, int] = {"SMPL": 24, "SMPL-X": 55}
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class EstimateContext:
     """The train camera as the tool saw its pictures, and what the user has said and given."""
 
     camera: Camera
@@ -35,19 +33,17 @@ class Known:
         """The user's body model, if one is given."""
         return read_smpl_model(self.chosen.body_model) if self.chosen.body_model else None
 
-    def require_model(self, tool: str, family: str) -> SmplModel:
+    def require_model(self, tool: str, family: Family) -> SmplModel:
         """The body model of a family. Raises InputError where another one or none is given."""
-        joints, where = MODELS[family]
-        action = f"Give the {family} model file (.pkl or .npz, from {where}) with --body-model."
         if self.model is None:
             needed = f"{tool} stores pose and shape, which need the {family} body model"
-            raise InputError(needed, "none", f"{action} {WITHOUT_MODEL}")
-        found = len(self.model.parents)
+            raise missing_model("none", family, needed)
+        joints, found = JOINTS[family], len(self.model.parents)
         if found != joints:
             raise InputError(
                 f"{tool} needs the {family} body model, which has {joints} joints",
                 f"a model with {found} joints",
-                f"Shapes and poses of other models mean something else. {action}",
+                f"Shapes and poses of other models mean something else. {where_to_get(family)}",
             )
         return self.model
 
@@ -57,28 +53,12 @@ class Known:
         From the file named for it or the body model. Raises InputError where neither fits.
         """
         if self.chosen.faces:
-            return _faces_of(self.chosen.faces, vertices)
+            return read_faces(self.chosen.faces, vertices)
         if self.chosen.body_model:
             return read_faces(self.chosen.body_model, vertices)
         raise InputError(
             f"{tool} stores no faces; they come from a body model or from a mesh",
             "none",
-            f"Give the SMPL model file (.pkl or .npz, from {SMPL_URL}) with --body-model, or any "
-            "mesh of this topology (OBJ, PLY, GLB, meshes.npz) with --set meshes.faces=FILE.",
+            f"{where_to_get()} Or give any mesh of this topology (OBJ, PLY, OFF, GLB, meshes.npz) "
+            "with --set meshes.faces=FILE.",
         )
-
-
-def _faces_of(path: Path, vertices: int) -> NDArray[np.int32]:
-    """Faces of a mesh, a body model, or a mesh file of our own."""
-    if path.suffix == ".npz":
-        arrays = read_npz(path)
-        bodies, faces = arrays.get("vertices"), arrays.get("faces")
-        if isinstance(bodies, np.ndarray) and isinstance(faces, np.ndarray):
-            if bodies.ndim == 3 and bodies.shape[1] == vertices:
-                return faces.astype(np.int32)
-            raise InputError(
-                f"{path} must hold bodies of {vertices} vertices",
-                f"{bodies.shape}",
-                "Give meshes of the same kind as the estimate's bodies.",
-            )
-    return read_faces(path, vertices)

@@ -1,0 +1,1 @@
+"""A bare video of one person: which frames, which camera, which person, where in each frame."""
