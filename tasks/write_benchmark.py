@@ -18,7 +18,7 @@ from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.markdown_tables import write_markdown_tables
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Experiments; tables as Markdown.
+ALGORITHM_VERSION = 3  # Plausibility, OKS and LPIPS.
 
 
 @stage(BenchmarkArtifact, ALGORITHM_VERSION)

@@ -18,7 +18,7 @@ from mocoflow_core.report.inputs import ReportInputs
 from mocoflow_core.report.page import write_report as write
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # Shows the remarks of the scene.
+ALGORITHM_VERSION = 5  # Remarks of the scene; intervals, and the photographs' own scores.
 
 
 @stage(ReportArtifact, ALGORITHM_VERSION)

@@ -28,13 +28,13 @@ class MetricLabel(NamedTuple):
 # Scores of single views against a photograph.
 VIEW_METRICS = {
     "psnr_union": MetricLabel("PSNR, person", "dB", 2, True),
-    "psnr": MetricLabel("PSNR, crop", "dB", 2, True),
-    "psnr_image": MetricLabel("PSNR, image", "dB", 2, True),
     "ssim": MetricLabel("SSIM", "", 3, True),
     "lpips_alex": MetricLabel("LPIPS", "", 3, False),
-    "mask_iou": MetricLabel("mask overlap", "", 3, True),
-    "oks": MetricLabel("OKS", "", 3, True),
     "plausibility": MetricLabel("plausibility", "", 2, True),
+    "oks": MetricLabel("OKS", "", 3, True),
+    "mask_iou": MetricLabel("mask overlap", "", 3, True),
+    "psnr": MetricLabel("PSNR, crop", "dB", 2, True),
+    "psnr_image": MetricLabel("PSNR, image", "dB", 2, True),
     "orbit_residual_mm": MetricLabel("keypoints around", "mm", 1, False),
     "train_psnr": MetricLabel("PSNR, train camera", "dB", 2, True),
 }

@@ -167,7 +167,7 @@ def _camera_rows(title: str, rows: list[ScoreRow], metrics: list[str]) -> list[C
 
 def _interval(values: list[float], label: MetricLabel) -> str:
     low, high = mean_interval(values)
-    return "" if np.isnan(low) else f"{label.text(low)} to {label.text(high)}"
+    return "" if np.isnan(low) else f"{label.text(low)}–{label.text(high)}"
 
 
 def _is_best(value: float, all_values: list[float], metric: str) -> bool:

@@ -62,9 +62,9 @@ def _focal_length(
             )
     focal = USUAL_EQUIVALENT_MM / FULL_FRAME_DIAGONAL_MM * diagonal_px
     return focal, (
-        f"caution: the focal length is guessed: {focal:.0f} px ({USUAL_EQUIVALENT_MM:g} mm equivalent, "
-        f"usual of phones) with an error of up to {100 * USUAL_ERROR:.0f} %, and so is the "
-        "distance; give a better one with --focal"
+        f"caution: the focal length is guessed: {focal:.0f} px ({USUAL_EQUIVALENT_MM:g} mm "
+        f"equivalent, usual of phones) with an error of up to {100 * USUAL_ERROR:.0f} %, and so is "
+        "the distance; give a better one with --focal"
     )
 
 

@@ -53,7 +53,7 @@ def test_a_video_becomes_a_scene_with_masks_plate_and_camera(scene):
 
 
 def test_what_was_assumed_is_said(scene):
-    said = "\n".join(scene.remarks)
+    said = "\n".join((*scene.remarks, *scene.caveats))
     for words in ("10 frames, 10 per second", "one person", "background moves"):
         assert words in said
     assert any("the focal length is guessed" in caveat for caveat in scene.caveats)
