@@ -8,6 +8,7 @@ import pytest
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import open_scene
 from tests.estimators.layouts import write_people
+from tests.small_smpl import write_smpl
 
 
 @pytest.fixture
@@ -41,3 +42,23 @@ def test_vibes_output_is_planned_from_its_file(prefect_server, toy_scene, vibe_o
     found, truth = (MeshSequence.load(f).vertices for f in (located, toy_scene / "meshes.npz"))
     # A pixel of 32 is 8 cm here.
     assert np.linalg.norm((found - truth).mean(axis=1), axis=-1).max() < 0.08
+
+
+def test_a_folder_of_body_models_may_be_given_or_be_the_users(
+    toy_scene, vibe_output, tmp_path, monkeypatch
+):
+    from flows.request import Request
+
+    folder = tmp_path / "mocoflow/body_models"
+    folder.mkdir(parents=True)
+    write_smpl(folder / "SMPL_NEUTRAL.pkl", 500)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "elsewhere"))
+    without = Request(scene_path=toy_scene, meshes=vibe_output)
+    assert without.body_model is None
+    setting = (f'meshes.body_model="{folder}"',)
+    given = Request(scene_path=toy_scene, meshes=vibe_output, settings=setting)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    by_default = Request(scene_path=toy_scene, meshes=vibe_output)
+    assert given.body_model == by_default.body_model
+    assert given.body_model.path == folder / "SMPL_NEUTRAL.pkl"
+    assert Request(scene_path=toy_scene).body_model is None

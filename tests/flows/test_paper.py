@@ -33,6 +33,7 @@ TINY = (
     "schedule.rays=32",
     "schedule.threads=1",
     "presentation.turntable_views=2",
+    "person_scores.views=1",
 )
 
 
@@ -46,9 +47,11 @@ def test_the_paper_s_stages_run_and_leave_what_the_fast_ones_leave(paper_run):
     out, record = paper_run
     assert [stage.name for stage in record.stages] == STAGES
     scores = read_scores(out / "scores.parquet")
-    assert {row.method for row in scores} == {"mocoflow", "posed_mesh"}
+    assert {row.method for row in scores} == {"mocoflow", "posed_mesh", "photograph"}
     assert all(np.isfinite(row.value) for row in scores)
-    assert {"correspondence_mm", "consensus_local_mm", "psnr"} <= {row.metric for row in scores}
+    measured = {row.metric for row in scores}
+    assert {"correspondence_mm", "consensus_local_mm", "psnr"} <= measured
+    assert {"plausibility", "lpips_alex"} <= measured
     assert read_curve(out / "error_curve.parquet")
     for name in ("report.html", "turntable.mp4", "views/cam01/000003.png"):
         assert (out / name).stat().st_size > 0
