@@ -62,9 +62,7 @@ def looks(body: FittableBody) -> Iterator[Look]:
         )  # fmt: skip
         person = Person.load(shape)
         posed, performance = perform(configuration, person)
-        lift = performance.root_position - posed.root_position
         coarse = coarse_topology(person, COARSE_TOPOLOGY).vertices(person.pose(posed))
-        coarse = coarse + lift[:, None]
         cameras = camera_ring(configuration, performance.vertices)
         rooms = [render_background(camera, 2, 0) for camera in cameras]
         for vertices, skin in zip(coarse, performance.vertices, strict=True):
