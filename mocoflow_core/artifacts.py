@@ -53,12 +53,6 @@ class MeshArtifact(Artifact):
     stage = "ingest_meshes"
 
 
-class FittedBodyArtifact(Artifact):
-    """A body fitted to landmarks and masks, located in world metres."""
-
-    stage = "fit_body"
-
-
 class LocationArtifact(Artifact):
     """The meshes in world metres, searched or taken over."""
 

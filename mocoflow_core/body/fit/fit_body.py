@@ -19,7 +19,6 @@ from mocoflow_core.body.fit.posed_body import BodyPose, PosedBody
 from mocoflow_core.body.fit.prior import Fact, Prior, PriorConfig
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.body.mesh_sequence import MeshSequence
-from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
@@ -123,24 +122,6 @@ def fit_body(
         pose = _onto_masks(outlines, [prior, close], pose, configuration, progress)
         overlaps = outlines.overlaps(pose)
     return _fitted(body, pose, sightings, overlaps, camera, frame_indices, sized)
-
-
-def fit_to_clip(
-    sightings: Sightings, clip: Clip, configuration: BodyFitConfig, progress: Progress
-) -> FittedBody:
-    """The same for a clip's camera and masks; held-out frames are bridged, never looked at."""
-    held_out = clip.held_out[:, None]
-    if len(held_out) != len(sightings.places):
-        raise InputError(
-            f"landmarks of the clip's {len(held_out)} frames",
-            f"those of {len(sightings.places)}",
-            "Find them in the clip's own pictures.",
-        )
-    looked_at = replace(sightings, confidence=np.where(held_out, 0.0, sightings.confidence))
-    masks = clip.masks & ~held_out[..., None]
-    return fit_body(
-        looked_at, masks, clip.camera, clip.fps, configuration, clip.frame_indices, None, progress
-    )
 
 
 def _onto_masks(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -75,23 +73,6 @@ class Sightings:
     def points(self, body: FittableBody) -> Mixtures:
         """The body's points that the detector would see, in the mean shape."""
         return Mixtures.of(body, body.regressor, self.offsets)
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read an .npz with ``places``, ``confidence`` and maybe ``world``, as for ``of``.
-
-        Raises InputError for anything else.
-        """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            return cls.of(arrays["places"], arrays["confidence"], arrays.get("world"))
-        except (KeyError, OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(
-                "landmarks in an .npz with places and confidence", path.name, "Write it again."
-            ) from error
 
     @property
     def seen(self) -> NDArray[np.bool_]:

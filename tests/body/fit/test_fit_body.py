@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mocoflow_core.body.fit.fit_body import BodyFitConfig, fit_body, fit_to_clip
+from mocoflow_core.body.fit.fit_body import BodyFitConfig, fit_body
 from mocoflow_core.body.fit.landmark_misfit import LandmarkConfig
 from mocoflow_core.body.fit.mask_misfit import MaskConfig
 from mocoflow_core.body.fit.posed_body import PosedBody
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.body.silhouette import overlap, silhouettes
-from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
 from tests.body.fit.made_movement import (
     BODY,
@@ -140,26 +139,3 @@ def test_what_is_saved_is_a_mesh_file_in_world_coordinates(exact, tmp_path):
         np.testing.assert_array_equal(arrays["vertices"], exact.meshes.vertices)
     with np.load(tmp_path / "fit.npz", allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["angles"], exact.pose.angles)
-
-
-def test_held_out_frames_are_never_looked_at():
-    camera, sightings = made_camera(), seen(keypoints_of(POSE), made_camera())
-    masks = silhouettes(PosedBody.of(BODY, POSE).vertices(), BODY.faces, camera)
-    held_out = np.arange(8) == 5
-    clip = Clip(
-        camera,
-        FPS,
-        np.arange(8, dtype=np.int32),
-        np.zeros((8, 128, 128, 3), np.uint8),
-        masks,
-        np.ones(8, bool),
-        held_out,
-        np.zeros((128, 128, 3), np.uint8),
-    )
-    few = KNOWN.model_copy(update={"looks": 1})
-    fitted = fit_to_clip(sightings, clip, few, lambda fraction, text: None)
-    changed = replace(sightings, places=sightings.places + 50.0 * held_out[:, None, None])
-    emptied = replace(clip, masks=masks & ~held_out[:, None, None])
-    again = fit_to_clip(changed, emptied, few, lambda fraction, text: None)
-    np.testing.assert_array_equal(fitted.meshes.vertices, again.meshes.vertices)
-    assert np.isnan(fitted.landmark_px[5])

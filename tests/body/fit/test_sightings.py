@@ -41,9 +41,3 @@ def test_other_sizes_are_refused(places, confidence, world):
 def test_a_clip_without_anybody_is_refused():
     with pytest.raises(InputError, match="person"):
         Sightings.of(np.zeros((3, 17, 2)), np.zeros((3, 17)))
-
-
-def test_a_file_without_landmarks_is_refused(tmp_path):
-    np.savez(tmp_path / "other.npz", vertices=np.zeros(3))
-    with pytest.raises(InputError, match="places and confidence"):
-        Sightings.load(tmp_path / "other.npz")
