@@ -77,7 +77,9 @@ def test_misplaced_views_need_no_run(compare, tmp_path):
     record = compare(tmp_path / "out", experiment="misalignment")
     assert record.cells == ()
     rows = read_misalignment(tmp_path / "out/misalignment.parquet")
-    assert len(rows) == 3 * len(MISPLACEMENTS)
+    metrics = {"psnr", "ssim", "lpips_alex", "plausibility", "oks"}
+    assert {row.metric for row in rows} == metrics
+    assert len(rows) == len(metrics) * len(MISPLACEMENTS)
     assert "Misplaced views" in (tmp_path / "out/benchmark.html").read_text()
     assert "misplaced views" in (tmp_path / "out/table.md").read_text()
 
