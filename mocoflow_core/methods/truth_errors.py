@@ -42,7 +42,7 @@ Points = NDArray[np.float64]
 class TruthConfig(ConfigurationPart):
     """How many frames, points and pairs of frames the distances are taken over."""
 
-    frames: int = Field(24, ge=2, description="At most so many frames, spread over the clip.")
+    frames: int = Field(16, ge=2, description="At most so many frames, spread over the clip.")
     points: int = Field(400, ge=1, description="Surface points, evenly spread over the vertices.")
     pairs_per_frame: int = Field(2, ge=1, description="Other frames each frame is reached from.")
     seed: int = Field(0, ge=0, description="Draws the pairs.")

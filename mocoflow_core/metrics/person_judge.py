@@ -33,7 +33,7 @@ class PersonScoreConfig(ConfigurationPart):
         "are absent, with the reason beside the others; off: none of them.",
     )
     views: int = Field(
-        20, ge=1, description="Views that the detectors look at, drawn once by evaluation.seed."
+        12, ge=1, description="Views that the detectors look at, drawn once by evaluation.seed."
     )
     confidence: float = Field(
         0.5, gt=0.0, le=1.0, description="A box counts as a person from this confidence on."
