@@ -24,7 +24,7 @@ def write(path: Path, content: object) -> Path:
 def file(tmp_path: Path) -> AlphaPoseFile:
     entries = [
         entry("out0000003.png", 100.0, 0.5, box=[95.0, 0.0, 30.0, 40.0]),
-        entry("out0000003.png", 10.0, 1.107, points=26),
+        entry("out0000003.png", 10.0, 1.107, points=26, idx=[0.0]),
         entry("out0000007.png", 10.0, 0.8),
     ]
     return AlphaPoseFile(write(tmp_path / "alphapose-results.json", entries))
