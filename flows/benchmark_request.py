@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from flows.benchmark_scenes import AskedScene, read_scenes
-from flows.request import Request, open_users_store
+from flows.request import Request
+from flows.users_store import open_users_store
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.store import Store
 from mocoflow_core.methods.ablations import SETTINGS, require_method

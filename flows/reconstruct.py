@@ -71,6 +71,7 @@ def reconstruct(
     )
     folder = request.claim(out)
     where, chosen = request.store, request.configuration
+    where.serve(out)
 
     prepared = prepare(request)
     show_plan(request, prepared.plan)
