@@ -54,8 +54,7 @@ class RemoteStore(Store):
 
     def find(self, kind: type[Kind], key: str) -> Kind | None:
         """As for a local store; what only one side holds is copied to the other."""
-        if found := self._look(kind, key):
-            self._share(kind.stage, key)
+        if found := self._look_and_share(kind, key):
             return found
         place = self._folder(kind.stage, key)
         with (
@@ -65,9 +64,15 @@ class RemoteStore(Store):
             return self._find_locked(kind, key) if free else None
 
     def _find_locked(self, kind: type[Kind], key: str) -> Kind | None:
-        found = self._look(kind, key)
+        found = self._look_and_share(kind, key)
         if found is None and self._download(kind.stage, key):
             found = self._look(kind, key)
+        return found
+
+    def _look_and_share(self, kind: type[Kind], key: str) -> Kind | None:
+        found = self._look(kind, key)
+        if found:
+            self._share(kind.stage, key)
         return found
 
     def publish(self, partial: Path, manifest: Manifest) -> None:
