@@ -85,7 +85,7 @@ def test_the_run_that_died_in_every_stage_is_finished_by_one_that_nothing_happen
 
 
 def test_a_worker_killed_alone_loses_at_most_the_stage_that_its_run_was_in(parts, scene, tmp_path):
-    """Its run goes on without it until it has something to say to it, and then ends."""
+    """Its run goes on until it writes a line of its log, which the worker has taken so far."""
     store = tmp_path / "store"
     run = start(parts, scene, tmp_path)
     until(lambda: list(store.glob("*/*.partial")), 300.0, "a stage works", 0.01)
