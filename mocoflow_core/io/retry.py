@@ -21,28 +21,22 @@ def persistent(store: str, ask: Callable[[], Answer]) -> Answer:
     Raises FileNotFoundError at once, as an answer; InputError at once where the store refuses, or
     when its last failure is one too many.
     """
-    for wait_s in WAITS_S:
+    waits = iter(WAITS_S)
+    while True:
         try:
             return ask()
-        except FileNotFoundError:
-            raise
-        except REFUSALS as error:
-            raise _out_of_reach(store, error) from error
         except Exception as error:
-            if not _may_pass(error):
+            if not _is_the_store_s(error):
                 raise
-            time.sleep(wait_s)
-    try:
-        return ask()
-    except Exception as error:
-        if isinstance(error, FileNotFoundError) or not _may_pass(error):
-            raise
-        raise _out_of_reach(store, error) from error
+            wait_s = None if isinstance(error, REFUSALS) else next(waits, None)
+            if wait_s is None:
+                raise _out_of_reach(store, error) from error
+        time.sleep(wait_s)
 
 
-def _may_pass(error: Exception) -> bool:
+def _is_the_store_s(error: Exception) -> bool:
     """Errors of the system and of the libraries that speak to stores; others are mistakes here."""
-    if says_disk_full(error):
+    if isinstance(error, FileNotFoundError) or says_disk_full(error):
         return False
     return isinstance(error, OSError) or type(error).__module__ != "builtins"
 
