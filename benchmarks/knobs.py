@@ -104,6 +104,11 @@ KNOBS = (
         _length("inner depth", "sampling.inner_depth_m", 0.032, 0.04, 0.06),
         ("32 mm",),
     ),
+    Knob(
+        "precision",
+        (Setting("precision", "bfloat16", ("schedule.precision=bfloat16",)),),
+        ("bfloat16",),
+    ),
     Knob("rates", tuple(map(_rates, (0.5, 1.0, 2.0, 4.0))), ("x 2",)),
     Knob(
         "motion lattice",
