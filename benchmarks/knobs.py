@@ -61,6 +61,10 @@ def _rates(factor: float) -> Setting:
     return Setting("rates", f"x {factor:g}", changes)
 
 
+def _precision(name: str) -> Setting:
+    return Setting("precision", name, (f"schedule.precision={name}",))
+
+
 def _repair(share: float) -> Setting:
     """Rounds of bending the joints, of both kinds in proportion."""
     repair = fast().repair
@@ -106,7 +110,7 @@ KNOBS = (
     ),
     Knob(
         "precision",
-        (Setting("precision", "bfloat16", ("schedule.precision=bfloat16",)),),
+        tuple(map(_precision, ("float32", "bfloat16"))),
         ("bfloat16",),
     ),
     Knob("rates", tuple(map(_rates, (0.5, 1.0, 2.0, 4.0))), ("x 2",)),
