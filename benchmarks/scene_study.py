@@ -1,8 +1,8 @@
 """One scene of a study: prepared once, trained many times, scored at views of other cameras.
 
 What the flow does between a scene folder and its scores, on the core's own functions and without
-a store. The scene's meshes must be located: no study searches for them. The training clock shows
-CPU seconds, also to a budget: what one idle core would take, whatever else the machine does.
+a store. The training clock shows CPU seconds, also to a budget: what one idle core would take,
+whatever else the machine does.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mocoflow_core.body.location import locate_body
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.extract import ClipNeeds, extract_clip, extract_evaluation
 from mocoflow_core.capture.scene import Scene
@@ -149,8 +150,11 @@ def _prepare(
         repeated_frames=choose.repeated_frames == "on",
     )
     clip = extract_clip(scene, configuration.capture, needs)
+    bodies = given.meshes
+    if needed["location_search"]:
+        bodies = locate_body(clip, given, configuration.location).meshes
     meshes, repair = repair_where_needed(
-        clip, given.meshes, configuration.repair, choose.body_repair, lambda share, text: None
+        clip, bodies, configuration.repair, choose.body_repair, lambda share, text: None
     )
     frames = decide_frames(0, len(clip.frames), choose)
     plan = plan_scene(clip, meshes, (*preparation, frames, repair), choose)
