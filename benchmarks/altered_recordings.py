@@ -1,4 +1,4 @@
-"""Synthetic recordings with a fault of their own: stills, a lamp that dims, a misplaced estimate."""
+"""Synthetic recordings with a fault: stills, a lamp that dims, a misplaced estimate."""
 
 from __future__ import annotations
 
