@@ -31,7 +31,7 @@ class RecordingConfig(ConfigurationPart):
         True,
         description="World coordinates, or the train camera's axes with the root at the origin.",
     )
-    seed: int = Field(0, ge=0, description="Of textures, joint noise and wrinkles.")
+    seed: int = Field(0, ge=0, description="Of textures, noise and wrinkles.")
 
 
 class SyntheticConfig(RecordingConfig):
@@ -48,6 +48,12 @@ class SyntheticConfig(RecordingConfig):
     )
     joint_noise_deg: float = Field(
         6.0, ge=0, lt=90, description="Root mean square angle of every joint's smooth error."
+    )
+    place_noise_m: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="Root mean square distance of the body's smooth error of place.",
     )
     shape: BodyShape = Field(BodyShape(height=0.4), description="The person filmed.")
     other_shape: BodyShape = Field(
