@@ -53,7 +53,10 @@ def read_bare_video(
         raise InputError("a video file", f"nothing at {path}", "Check the path.")
     facts = read_video_facts(path)
     frames, rate_said = choose_frames(path, facts, configuration)
-    person = follow_person(frames, frames.rate, configuration.person, BlazePose(), progress)
+    person = follow_person(
+        *(frames, frames.rate, configuration.start_s, configuration.person),
+        *(BlazePose(), progress),
+    )
     frames = frames.part(person.first, person.last)
     plate, pictures, covered = make_plate(frames, person, frames.size, configuration.plate_frames)
     checked = np.unique(np.linspace(0, len(pictures) - 1, CHECKED_FRAMES).round().astype(int))

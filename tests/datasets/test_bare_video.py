@@ -74,7 +74,10 @@ def test_a_file_is_a_video_and_a_folder_is_none(tmp_path):
     [
         ([ROOM] * 10, "nobody in the video"),
         ([np.hstack((p, p[:, ::-1])) for p in MOVING], "2 of a size. Choose one: --person 0: "),
-        (MOVING[:4] + [ROOM] * 9, "one who is there from 0.0 to 0.3 s of 1.3 s of the clip"),
+        (
+            MOVING[:4] + [ROOM] * 9,
+            "from 0.0 to 0.3 s of the video, in 4 of 13 frames. Choose that part: --clip 0.0-0.3.",
+        ),
         (MOVING[:2], "at least 10 frames, got 2"),
     ],
     ids=["nobody", "two", "leaves", "two frames"],
