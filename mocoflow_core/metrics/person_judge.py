@@ -50,6 +50,11 @@ class PersonScoreConfig(ConfigurationPart):
     keypoint_confidence: float = Field(
         0.3, gt=0.0, le=1.0, description="Points of the photograph that OKS compares."
     )
+    on_curve: bool = Field(
+        False,
+        description="They are measured along the error curve as well: some seconds more for each "
+        "of its points, which the training clock does not count.",
+    )
     orbit_moments: int = Field(
         3, ge=1, description="Moments shown from all around where no other camera exists."
     )

@@ -32,7 +32,7 @@ class AlphaPoseFile:
             try:
                 frame, person = _frame(str(entry["image_id"])), _keypoints(entry["keypoints"])
                 box = _box(entry, person)
-            except (KeyError, TypeError, ValueError) as error:
+            except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise InputError(
                     f"{path} as AlphaPose results", f"entry {number} ({error})", ADVICE
                 ) from error
@@ -100,7 +100,7 @@ def _existing(path: Path) -> Path:
 def _entries(path: Path) -> list[Mapping[str, Any]]:
     try:
         content = json.loads(path.read_text())
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path} as JSON", str(error), ADVICE) from error
     if not isinstance(content, list):
         raise InputError(f"{path} as AlphaPose results, a list", type(content).__name__, ADVICE)
@@ -131,6 +131,8 @@ def _box(entry: Mapping[str, Any], person: Keypoints) -> NDArray[np.float32]:
     """The stored x, y, width, height as corners, or the box of the points."""
     if "box" in entry:
         x, y, width, height = (float(value) for value in entry["box"])
+        if not np.isfinite([x, y, width, height]).all():
+            raise ValueError("a box that is not finite")
         return np.array([x, y, x + width, y + height], np.float32)
     return np.concatenate([person.places.min(axis=0), person.places.max(axis=0)])
 

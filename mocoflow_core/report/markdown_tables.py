@@ -6,10 +6,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from mocoflow_core.methods.ablations import change_of
+from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.metric_labels import MetricLabel, label_of
 from mocoflow_core.report.misalignment_table import misalignment_tables
 from mocoflow_core.report.summary_table import (
+    ABOUT_PHOTOGRAPHS,
     SummaryCell,
     TableRow,
     by_scene,
@@ -47,6 +49,8 @@ def _scores(results: BenchmarkResults) -> Iterator[str]:
     if summaries:
         yield ""
         yield "Mean over seeds, in brackets the lowest and the highest. Best of a scene in bold."
+    if any(contender.method in PHOTOGRAPHS for contender in summaries):
+        yield from ("", ABOUT_PHOTOGRAPHS)
     if changes:
         yield ""
         yield from (f"- {_words(method)}: {change}" for method, change in changes.items())

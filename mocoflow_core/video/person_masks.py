@@ -60,12 +60,19 @@ def rough_masks(person: FollowedPerson, rows: NDArray[np.integer], size: tuple[i
 
 
 def make_plate(
-    frames: FrameSource, person: FollowedPerson, size: tuple[int, int], most: int
+    frames: FrameSource,
+    person: FollowedPerson,
+    learned: NDArray[np.bool_],
+    size: tuple[int, int],
+    most: int,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], Mask]:
-    """The background (H, W, 3), and the frames (N, H, W, 3) and masks that it is made of."""
-    count = len(person.poses)
-    rows = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-    rows = rows[person.seen[rows]]
+    """The background (H, W, 3), and the frames (N, H, W, 3) and masks that it is made of.
+
+    ``learned``: (T,) frames that may be looked at, the first among them.
+    """
+    usable = np.flatnonzero(learned & person.seen)
+    spread = np.linspace(0, len(usable) - 1, min(most, len(usable))).round().astype(int)
+    rows = usable[np.unique(spread)]
     pictures = np.stack([picture for _, picture in frames.read(frames.indices[rows].tolist())])
     masks = rough_masks(person, rows, size)
     return background_plate(pictures, masks, round(PLATE_MARGIN * max(size))), pictures, masks
@@ -75,15 +82,21 @@ def mask_person(
     frames: FrameSource,
     rate: float,
     person: FollowedPerson,
+    learned: NDArray[np.bool_],
     plate: NDArray[np.uint8],
     least_difference: int,
     progress: Progress,
 ) -> PackedMasks:
-    """A mask for every frame, from the network and the difference to the plate."""
+    """A mask for every frame, from the network and the difference to the plate.
+
+    The mask of a frame that is ``learned`` (T,) from comes from such frames alone.
+    """
     shape = plate.shape[:2]
+    reach = int(rate * LONGEST_STEP_S)
     packed = []
     for row, (_, picture) in enumerate(frames.read(frames.indices.tolist())):
-        probability = _steady(person.poses, row, shape, rate)
+        around = [person.poses[near] for near in neighbours(row, learned, reach)]
+        probability = _steady(person.poses[row], around, shape)
         if not person.seen[row]:
             probability = np.full_like(probability, 0.5) * (probability > 0)
         mask = refine(probability, picture, plate, least_difference)
@@ -104,14 +117,24 @@ def refine(
     return _without_holes(_without_pieces(mask))
 
 
-def _steady(poses: list[Pose], row: int, shape: tuple[int, ...], rate: float) -> Probability:
-    """The network's probability, the median over time where it is unsure."""
-    here = poses[row].mask(shape[0], shape[1])
-    if not 0 < row < len(poses) - 1 or rate * LONGEST_STEP_S < 1:
+def neighbours(row: int, learned: NDArray[np.bool_], reach: int) -> list[int]:
+    """The rows before and after one that may help it; none where one of them is out of reach."""
+    may_help = np.flatnonzero(learned) if learned[row] else np.arange(len(learned))
+    place = int(np.searchsorted(may_help, row))
+    if not 0 < place < len(may_help) - 1:
+        return []
+    found = [int(may_help[place - 1]), int(may_help[place + 1])]
+    return found if found[1] - row <= reach and row - found[0] <= reach else []
+
+
+def _steady(pose: Pose, around: list[Pose], shape: tuple[int, ...]) -> Probability:
+    """The network's probability, the median with its neighbours where it is unsure."""
+    here = pose.mask(shape[0], shape[1])
+    if not around:
         return here
     unsure = (here > SURELY_NOT) & (here < SURELY)
-    around = [poses[near].mask(shape[0], shape[1])[unsure] for near in (row - 1, row + 1)]
-    here[unsure] = np.median(np.stack([here[unsure], *around]), axis=0)
+    beside = [near.mask(shape[0], shape[1])[unsure] for near in around]
+    here[unsure] = np.median(np.stack([here[unsure], *beside]), axis=0)
     return here
 
 

@@ -68,11 +68,7 @@ def choose_track(tracks: Sequence[Track], frames: int, person: int | None) -> tu
     none is named.
     """
     if not tracks:
-        raise InputError(
-            "a person who can be seen",
-            "nobody in the video",
-            "Film the whole person, upright, from 2 to 5 metres.",
-        )
+        raise nobody()
     listed = "; ".join(
         f"--person {number}: {track.describe(frames)}" for number, track in enumerate(tracks)
     )
@@ -98,6 +94,14 @@ def choose_track(tracks: Sequence[Track], frames: int, person: int | None) -> tu
     if len(tracks) == 1:
         return first, f"one person: {first.describe(frames)}"
     return first, f"{len(tracks)} persons, the largest is followed; {listed}"
+
+
+def nobody() -> InputError:
+    return InputError(
+        "a person who can be seen",
+        "nobody in the video",
+        "Film the whole person, upright, from 2 to 5 metres.",
+    )
 
 
 def overlap(first: Region, second: Region) -> float:

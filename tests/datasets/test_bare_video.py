@@ -12,6 +12,7 @@ from mocoflow_core.datasets.kinds import KINDS
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.video import write_video
 from mocoflow_core.video.configuration import VideoConfig
+from tests.lossless_video import write_lossless
 from tests.one_thread import one_thread  # noqa: F401
 from tests.squat_pictures import empty_room, squat_pictures
 
@@ -74,7 +75,10 @@ def test_a_file_is_a_video_and_a_folder_is_none(tmp_path):
     [
         ([ROOM] * 10, "nobody in the video"),
         ([np.hstack((p, p[:, ::-1])) for p in MOVING], "2 of a size. Choose one: --person 0: "),
-        (MOVING[:4] + [ROOM] * 9, "one who is there from 0.0 to 0.3 s of 1.3 s of the clip"),
+        (
+            MOVING[:4] + [ROOM] * 9,
+            "from 0.0 to 0.3 s of the video, in 4 of 13 frames. Choose that part: --clip 0.0-0.3.",
+        ),
         (MOVING[:2], "at least 10 frames, got 2"),
     ],
     ids=["nobody", "two", "leaves", "two frames"],
@@ -90,3 +94,21 @@ def test_a_text_is_no_video(tmp_path):
     (tmp_path / "film.mp4").write_text("no film")
     with pytest.raises(InputError, match="must be a video that can be decoded"):
         read_bare_video(tmp_path / "film.mp4", QUICK)
+
+
+def test_a_frame_that_may_serve_for_scoring_reaches_nothing_that_is_learned_from(tmp_path, scene):
+    other = [
+        picture if row % 2 == 0 else np.maximum(picture, 120) for row, picture in enumerate(MOVING)
+    ]
+    made = []
+    for name, pictures in (("film", MOVING), ("other", other)):
+        film = tmp_path / f"{name}.mp4"
+        write_lossless(film, pictures, 10)
+        made.append(read_bare_video(film, QUICK).cameras["camera"])
+    one, two = made
+    np.testing.assert_array_equal(one.background, two.background)
+    masks = [dict(camera.masks.read(range(10))) for camera in made]
+    for row in range(0, 10, 2):
+        np.testing.assert_array_equal(masks[0][row], masks[1][row])
+    assert any((masks[0][row] != masks[1][row]).any() for row in range(1, 10, 2))
+    assert "made from 5 frames; 5 between them may serve for scoring" in "".join(scene.remarks)

@@ -45,6 +45,15 @@ def test_a_varying_rate_becomes_even_times():
     assert "varies (10 to 30.3 per second)" in said
 
 
+def test_frames_of_a_varying_rate_are_the_nearest_ones():
+    times = np.cumsum(np.random.default_rng(0).choice([0.01, 0.03, 0.08], 300))
+    times -= times[0]
+    frames, _ = choose_frames(PATH, VideoFacts(times, {}), VideoConfig(fps=20))
+    wanted = np.arange(len(frames.numbers)) / frames.rate
+    off = np.abs(times[frames.numbers] - wanted)
+    assert off == pytest.approx(np.abs(times[None] - wanted[:, None]).min(1))
+
+
 def test_stamps_rounded_to_milliseconds_are_a_constant_rate():
     times = np.round(np.arange(90) / 29.97, 3)
     frames, _ = choose_frames(PATH, VideoFacts(times, {}), VideoConfig())
