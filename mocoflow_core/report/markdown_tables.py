@@ -71,7 +71,7 @@ def _misplaced(results: BenchmarkResults) -> Iterator[str]:
         heading = ["", *(_titled(label) for label in table.labels)]
         yield from _table(heading, ([row.name, *row.values] for row in table.rows))
     for protocol in sorted({row.protocol for row in results.misplaced}):
-        yield from ("", f"Protocol: {protocol}.")
+        yield from ("", f"Protocol: {plain(protocol)}.")
 
 
 def _missing(results: BenchmarkResults) -> Iterator[str]:
