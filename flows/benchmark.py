@@ -8,7 +8,7 @@ from typing import Any
 from prefect import flow
 
 from flows.benchmark_request import BenchmarkRequest
-from flows.run_cell import run_cell
+from flows.run_cells import run_cells
 from flows.run_facts import show_benchmark_in_prefect
 from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
 from tasks.collect_cells import collect_cells
@@ -32,10 +32,14 @@ def benchmark(
     settings: tuple[str, ...] = (),
     targets: tuple[str, ...] = (),
     store: str | None = None,
+    workers: int = 1,
+    dask: str | None = None,
+    slots: str | None = None,
 ) -> BenchmarkRecord:
     """Compare methods and presets on several scenes, each cell a flow run of its own.
 
-    Cells run one after the other. One that fails, that is cancelled on Prefect's pages, or whose
+    Cells run one after the other, in several processes or on a Dask cluster, with the same results.
+    One that fails, that is cancelled on Prefect's pages, or whose
     settings make no sense, is an omission of the comparison and stops no other; one that is
     finished in its folder is not run again.
 
@@ -53,6 +57,11 @@ def benchmark(
         settings: single fields for all cells, such as ``schedule.fine_steps=200``.
         targets: scores to be reached, such as ``psnr_union=20``.
         store: folder or fsspec address of the artifact store.
+        workers: processes of this machine that run cells at once, each with its share of the cores.
+        dask: address of a Dask scheduler whose workers run the cells; they read and write the same
+            paths as this process.
+        slots: what each running cell holds one of: a resource of the Dask workers, else a global
+            concurrency limit of the Prefect server.
     """
     request = BenchmarkRequest(
         experiment=experiment,
@@ -65,9 +74,12 @@ def benchmark(
         settings=settings,
         targets=targets,
         store_url=store,
+        workers=workers,
+        dask=dask,
+        slots=slots,
     )
     folder, where = request.claim(), request.store
-    cells = tuple(run_cell(cell) for cell in request.cells())
+    cells = run_cells(request.cells(), request.runs_on)
 
     done = [cell for cell in cells if cell.state == "finished"]
     files = folder_source(out, [f"{cell.folder}/{table}" for cell in done for table in TABLES])

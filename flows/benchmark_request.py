@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from flows.benchmark_scenes import AskedScene, read_scenes
 from flows.request import Request, open_users_store
+from flows.workers import Workers
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.store import Store
 from mocoflow_core.methods.ablations import SETTINGS, require_method
@@ -27,7 +28,10 @@ _FROM_EXPERIMENT = ("scenes", "methods", "presets")
 
 
 class Cell(NamedTuple):
-    """One run: where it is recorded, what the flow is asked for, and where its results go."""
+    """One run: where it is recorded, what the flow is asked for, and where its results go.
+
+    All paths are absolute: a cell may run in another process.
+    """
 
     record: CellRecord
     request: Request
@@ -52,6 +56,9 @@ class BenchmarkRequest(BaseModel):
     settings: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
     store_url: str | None = None
+    workers: int = 1
+    dask: str | None = None
+    slots: str | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -66,6 +73,10 @@ class BenchmarkRequest(BaseModel):
     def compares(self) -> Experiment:
         """The experiment, or the usual comparison."""
         return USUAL if self.experiment is None else EXPERIMENTS[self.experiment]
+
+    @property
+    def runs_on(self) -> Workers:
+        return Workers(count=self.workers, dask=self.dask, slots=self.slots)
 
     @cached_property
     def store(self) -> Store:
@@ -96,7 +107,8 @@ class BenchmarkRequest(BaseModel):
             words += ["--set", setting]
         if self.targets:
             words += ["--targets", *self.targets]
-        return shlex.join([*words, *(["--store", self.store_url] if self.store_url else [])])
+        words += ["--store", self.store_url] if self.store_url else []
+        return shlex.join([*words, *self.runs_on.words])
 
     def claim(self) -> BenchmarkFolder:
         """Take the output folder. Raises InputError for anything that no cell could run with."""
@@ -126,12 +138,12 @@ class BenchmarkRequest(BaseModel):
         self, scene: AskedScene, preset: str, changes: tuple[str, ...], seed: int
     ) -> Request:
         return Request(
-            scene_path=scene.folder(),
+            scene_path=scene.folder().resolve(),
             preset=preset,
             seed=seed,
             budget_s=self.budget_s,
             settings=(*self.settings, *scene.settings, *changes),
-            store_url=self.store_url,
+            store_url=self.store.url,
         )
 
     def _cell(self, scene: AskedScene, preset: str, method: str, seed: int) -> Cell:
@@ -148,7 +160,7 @@ class BenchmarkRequest(BaseModel):
             reason=str(refusal or ""),
         )
         request = self._request(scene, preset, SETTINGS[method], seed)
-        return Cell(record, request, self.out / folder)
+        return Cell(record, request, self.out.resolve() / folder)
 
     def _refusal(self, preset: str, method: str) -> InputError | None:
         """Why a method makes no sense with a preset and the settings, if it does not."""
@@ -181,6 +193,7 @@ class BenchmarkRequest(BaseModel):
         if refusals and all(refusals):
             raise next(filter(None, refusals))
         _ = self.waited_for
+        self.runs_on.check()
 
 
 def _all_known(option: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flows.demo_scene import demo_scene
+from mocoflow_core.capture.names import is_one_line
 from mocoflow_core.errors import InputError
 from mocoflow_core.synthetic.catalogue import named_scene
 
@@ -55,10 +56,20 @@ def _read(word: str) -> AskedScene:
             raise InputError(
                 "A scene is a folder or a synthetic one's name", repr(where), "Check the path."
             )
-        name = Path(where).resolve().name
+        name = _one_line(Path(where).resolve().name)
     else:
         name = named_scene(where).name
     return AskedScene(f"{name}@{camera}" if camera else name, where, camera or None)
+
+
+def _one_line(name: str) -> str:
+    if not is_one_line(name):
+        raise InputError(
+            "A scene's folder has a name of one line without control characters",
+            repr(name),
+            "Rename the folder.",
+        )
+    return name
 
 
 def _is_folder(where: str) -> bool:

@@ -14,6 +14,7 @@ from flows.import_dataset import import_dataset
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from flows.video_options import Clip, Focal, is_bare_video, video_settings
+from flows.worker_options import CellWorkers, DaskAddress, Slots
 from mocoflow_core.errors import InputError
 
 # Written out: presets and experiments themselves take torch, which takes a second.
@@ -214,6 +215,9 @@ def benchmark(
         typer.Option(metavar="METRIC=VALUE...", help="Scores to be reached, as psnr_union=20."),
     ] = None,
     store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+    workers: Annotated[int, CellWorkers] = 1,
+    dask: Annotated[str | None, DaskAddress] = None,
+    slots: Annotated[str | None, Slots] = None,
 ) -> None:
     """Compare methods and presets on several scenes: error against run time."""
     from flows.benchmark_request import BenchmarkRequest
@@ -229,6 +233,9 @@ def benchmark(
         settings=tuple(settings or ()),
         targets=tuple(targets or ()),
         store_url=store,
+        workers=workers,
+        dask=dask,
+        slots=slots,
     )
     request.claim()
     set_environment()
@@ -246,6 +253,9 @@ def benchmark(
             settings=request.settings,
             targets=request.targets,
             store=request.store_url,
+            workers=request.workers,
+            dask=request.dask,
+            slots=request.slots,
         )
     for cell in record.cells:
         if cell.state != "finished":

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from mocoflow_core.capture.names import FolderName
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.synthetic.body_shape import BodyShape
 
@@ -16,7 +17,7 @@ MeshEstimate = Literal["exact", "other_topology", "joint_noise", "other_shape"]
 class RecordingConfig(ConfigurationPart):
     """How a performance is recorded. The same values give the same bytes."""
 
-    name: str = Field("turn", pattern=r"^[^/]+$", description="Name of the scene.")
+    name: FolderName = Field("turn", description="Name of the scene.")
     frames: int = Field(48, ge=1, description="Number of frames, spread over the whole motion.")
     fps: float = Field(12.0, gt=0, description="Frames per second that scene.json states.")
     width: int = Field(128, ge=8, description="Pixels of every camera.")

@@ -74,7 +74,7 @@ def test_misplaced_views_have_a_table_of_their_own(lines):
 
 
 def test_what_was_refused_is_said_with_its_reason(lines):
-    assert "- turn/paper/without_light, seed 0: refused: no | light" in lines
+    assert "- turn/paper/without_light, seed 0: refused: no \\| light" in lines
 
 
 def test_photographs_stand_in_the_table_and_compete_with_nobody(tmp_path):
