@@ -36,6 +36,7 @@ def run_cell(cell: Cell) -> CellRecord:
             seed=request.seed,
             budget_s=request.budget_s,
             settings=request.settings,
+            import_settings=request.import_settings,
             store=request.store_url,
             return_state=True,
         )

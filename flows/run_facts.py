@@ -68,14 +68,16 @@ def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
 
 
 def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
-    """On the run's page: the scores, the error curve, the stages and where the report lies."""
+    """On the run's page: the scores, the error curve, the stages and a link to the report."""
     rows = [
         {"method": method, "camera": camera, **metrics}
         for method, cameras in record.scores.items()
         for camera, metrics in cameras.items()
     ]
     create_table_artifact(rows, key="scores", description=f"Mean scores of {record.scene}")
-    lines = [f"# {record.scene}", "", f"`{report}`", "", *_embedded(picture)]
+    curve = "\n".join([f"# {record.scene}", "", *_embedded(picture)])
+    create_markdown_artifact(curve, key="error-curve", description="Error against run time")
+    lines = [f"# {record.scene}", "", f"[Report]({report.resolve().as_uri()}): `{report}`", ""]
     lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [
         f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'from the store' if s.cached else ''} |"
