@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from flows.allowed_folders import AllowedFolders
 from flows.benchmark_scenes import AskedScene, read_scenes
 from flows.request import Request, open_users_store
 from flows.workers import Workers
@@ -119,7 +120,12 @@ class BenchmarkRequest(BaseModel):
             budget_s=self.budget_s,
             command=self.command,
         )
-        return BenchmarkFolder.claim(self.out, begun)
+        return BenchmarkFolder.claim(self.place, begun)
+
+    @cached_property
+    def place(self) -> Path:
+        """Where the results go. Raises InputError for a folder that may not be written."""
+        return AllowedFolders.of_environment().to_write(self.out, "out")
 
     def cells(self) -> Iterator[Cell]:
         """Every scene with every preset, method that runs, and seed; scenes made when needed."""
@@ -143,7 +149,8 @@ class BenchmarkRequest(BaseModel):
             seed=seed,
             budget_s=self.budget_s,
             settings=(*self.settings, *scene.settings, *changes),
-            store_url=self.store.url,
+            import_settings=scene.import_settings,
+            store_url=self.store.url if self.store_url else None,
         )
 
     def _cell(self, scene: AskedScene, preset: str, method: str, seed: int) -> Cell:
@@ -160,7 +167,7 @@ class BenchmarkRequest(BaseModel):
             reason=str(refusal or ""),
         )
         request = self._request(scene, preset, SETTINGS[method], seed)
-        return Cell(record, request, self.out.resolve() / folder)
+        return Cell(record, request, self.place.resolve() / folder)
 
     def _refusal(self, preset: str, method: str) -> InputError | None:
         """Why a method makes no sense with a preset and the settings, if it does not."""

@@ -42,6 +42,7 @@ def run_cell(cell: Cell, slots: str | None = None) -> CellRecord:
                 seed=request.seed,
                 budget_s=request.budget_s,
                 settings=request.settings,
+                import_settings=request.import_settings,
                 store=request.store_url,
                 return_state=True,
             )

@@ -69,14 +69,18 @@ def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
 
 
 def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
-    """On the run's page: the scores, the error curve, the stages and where the report lies."""
+    """On the run's page: the scores, the error curve, the stages and a link to the report."""
     rows = [
         {"method": method, "camera": unlinked(camera), **metrics}
         for method, cameras in record.scores.items()
         for camera, metrics in cameras.items()
     ]
-    create_table_artifact(rows, key="scores", description=f"Mean scores of {plain(record.scene)}")
-    lines = [f"# {plain(record.scene)}", "", code(str(report)), "", *_embedded(picture)]
+    scene = plain(record.scene)
+    create_table_artifact(rows, key="scores", description=f"Mean scores of {scene}")
+    curve = "\n".join([f"# {scene}", "", *_embedded(picture)])
+    create_markdown_artifact(curve, key="error-curve", description="Error against run time")
+    link = f"[Report]({report.resolve().as_uri()}): {code(str(report))}"
+    lines = [f"# {scene}", "", link, ""]
     lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [
         f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'from the store' if s.cached else ''} |"
