@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test e2e stability bench check format
+.PHONY: install demo test e2e faults stability bench check format
 
 install: $(INSTALLED)
 
@@ -22,6 +22,10 @@ test: install
 # Whole processes: killed ranks and runs, a server with a worker. Some minutes.
 e2e: install
 	$(BIN)/python -m pytest -m e2e
+
+# What is lost when something dies or breaks: docs/reliability.md. A quarter of an hour.
+faults: install
+	$(BIN)/python -m pytest -m faults
 
 stability: install
 	$(BIN)/mocoflow stability --out stability

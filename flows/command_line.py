@@ -13,6 +13,7 @@ from flows.finished_run import export, render
 from flows.import_dataset import import_dataset
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
+from flows.store_commands import store_app
 from flows.video_options import Clip, Focal, is_bare_video, video_settings
 from flows.worker_options import CellWorkers, DaskAddress, Slots
 from mocoflow_core.errors import InputError
@@ -270,6 +271,7 @@ def benchmark(
         sys.exit(1)
 
 
+app.add_typer(store_app, name="store")
 app.command("import")(import_dataset)
 app.command()(render)
 app.command()(export)

@@ -6,13 +6,13 @@ its stages look at that now and then.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from uuid import UUID
 
-import httpx
 from prefect.client.orchestration import get_client
 from prefect.context import TaskRunContext
 from prefect.states import Cancelled
+
+from tasks.server import if_the_server_answers
 
 
 class RunCancelled(RuntimeError):
@@ -28,7 +28,7 @@ def end_if_cancelled() -> None:
     run_id = context.task_run.flow_run_id if context else None
     if run_id is None:
         return
-    with suppress(httpx.HTTPError):
+    with if_the_server_answers():
         if is_cancelled(run_id):
             raise RunCancelled("cancelled on Prefect's pages")
 

@@ -12,6 +12,7 @@ from prefect.context import TaskRunContext
 
 from mocoflow_core.training.clock import Seconds
 from mocoflow_core.training.snapshots import Snapshot
+from tasks.server import if_the_server_answers
 
 KEY = "train-psnr"
 
@@ -31,7 +32,10 @@ class GrowingCurve:
         """Put all points so far on the page; outside of a task there is none."""
         if not TaskRunContext.get():
             return
-        text = "\n".join(_rows(curve, self._before))
+        with if_the_server_answers():
+            self._write("\n".join(_rows(curve, self._before)))
+
+    def _write(self, text: str) -> None:
         if self._id is None:
             created = create_markdown_artifact(
                 text, key=KEY, description="PSNR of pixels that are not trained on, as it grows"

@@ -11,6 +11,7 @@ from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import TaskRunContext
 
 from tasks.cancellation import end_if_cancelled
+from tasks.server import if_the_server_answers
 from tasks.terminal_bar import Progress, terminal_bar
 
 # Each update is an event that Prefect keeps for days.
@@ -35,7 +36,8 @@ def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Prog
                 updated = time.monotonic()
                 note_time()
                 if artifact:
-                    artifact.update(fraction, text)
+                    with if_the_server_answers():
+                        artifact.update(fraction, text)
                     end_if_cancelled()
 
         yield report

@@ -15,7 +15,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from prefect import Task, get_run_logger
 from prefect.cache_policies import CachePolicy
-from prefect.context import TaskRunContext
+from prefect.context import FlowRunContext, TaskRunContext
 from pydantic import JsonValue
 
 from mocoflow_core.artifacts import Artifact
@@ -76,7 +76,10 @@ class CachedStage(Generic[Inputs, Kind]):
     def __call__(self, store: Store, *args: Inputs.args, **kwargs: Inputs.kwargs) -> Kind:
         _, *names = inspect.signature(self.body).parameters
         arguments = dict(zip(names, args, strict=False)) | kwargs
-        found = store.find(self.kind, self._key(arguments))
+        key = self._key(arguments)
+        found = store.find(self.kind, key)
+        if found is None and (fault := store.fault(self.kind, key)):
+            _tell(f"{self.kind.stage}/{key} is damaged and computed again: {fault}")
         computed = self.task.with_options(refresh_cache=found is None)(store, arguments)
         return found or computed
 
@@ -114,7 +117,7 @@ class CachedStage(Generic[Inputs, Kind]):
 def _tell(line: str) -> None:
     """In a terminal, and on the run's page."""
     terminal_line(line)
-    if TaskRunContext.get():
+    if TaskRunContext.get() or FlowRunContext.get():
         get_run_logger().info(line)
 
 

@@ -18,7 +18,7 @@ def full_disk_is_bad_input(place: str) -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        if not _says_disk_full(error):
+        if not says_disk_full(error):
             raise
         raise InputError(
             f"{place} needs free space",
@@ -27,7 +27,7 @@ def full_disk_is_bad_input(place: str) -> Iterator[None]:
         ) from error
 
 
-def _says_disk_full(error: BaseException | None) -> bool:
+def says_disk_full(error: BaseException | None) -> bool:
     """Libraries wrap the system's error: look along the chain, and at their words."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):

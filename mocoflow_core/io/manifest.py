@@ -5,14 +5,16 @@ from __future__ import annotations
 import importlib.metadata
 import os
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from pydantic import BaseModel, ConfigDict, JsonValue, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, field_validator
 
 from mocoflow_core.io.content_key import digest_file
 
 MANIFEST = "manifest.json"
 FORMAT = "mocoflow-artifact"
+NO_MANIFEST = f"{MANIFEST} is missing or cannot be read"
+OTHER_MANIFEST = f"{MANIFEST} is that of another artifact"
 NAMED_LIBRARIES = ("mocoflow", "torch", "numpy", "scipy", "trimesh", "av")
 
 
@@ -23,15 +25,29 @@ class Payload(BaseModel):
 
     path: str
     size: int
-    sha256: str
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
 
-    def is_intact(self, folder: Path) -> bool:
-        """Whether the file is there with its size and its digest."""
+    @field_validator("path")
+    @classmethod
+    def _stays_inside(cls, path: str) -> str:
+        """Manifests come from shared stores: none may name a file outside of its folder."""
+        if PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts:
+            raise ValueError(f"{path!r} leads out of the artifact's folder")
+        return path
+
+    def fault(self, folder: Path, *, thorough: bool = True) -> str | None:
+        """What is wrong with the file, in words; ``None`` where size and digest are right.
+
+        Without ``thorough`` the size alone is looked at.
+        """
         file = folder / self.path
-        return file.is_file() and file.stat().st_size == self.size and self._matches(file)
-
-    def _matches(self, file: Path) -> bool:
-        return digest_file(file) == self.sha256
+        if not file.is_file():
+            return f"{self.path} is missing"
+        if (size := file.stat().st_size) != self.size:
+            return f"{self.path} has {size} bytes instead of {self.size}"
+        if thorough and digest_file(file) != self.sha256:
+            return f"{self.path} has changed since it was written"
+        return None
 
 
 class Manifest(BaseModel):
@@ -55,15 +71,37 @@ class Manifest(BaseModel):
     def read(cls, folder: Path) -> Manifest | None:
         """The manifest in a folder; ``None`` where there is none or it is damaged."""
         try:
-            return cls.model_validate_json((folder / MANIFEST).read_bytes())
-        except (OSError, ValidationError):
+            return cls.parse((folder / MANIFEST).read_bytes())
+        except OSError:
+            return None
+
+    @classmethod
+    def parse(cls, content: bytes | None) -> Manifest | None:
+        """A manifest from its file's content; ``None`` where there is none or it is damaged."""
+        try:
+            return None if content is None else cls.model_validate_json(content)
+        except ValidationError:
             return None
 
     def write(self, folder: Path) -> None:
         (folder / MANIFEST).write_text(self.model_dump_json(indent=1) + "\n")
 
-    def is_intact(self, folder: Path) -> bool:
-        return all(payload.is_intact(folder) for payload in self.payloads)
+    def is_of(self, stage: str, key: str) -> bool:
+        return (self.stage, self.key) == (stage, key)
+
+
+def fault_of(folder: Path, *, thorough: bool = True) -> str | None:
+    """What is wrong with the artifact in ``<stage>/<key>/``, in words; ``None`` where nothing is.
+
+    Without ``thorough`` sizes are looked at, not digests.
+    """
+    manifest = Manifest.read(folder)
+    if manifest is None:
+        return NO_MANIFEST
+    if not manifest.is_of(folder.parent.name, folder.name):
+        return OTHER_MANIFEST
+    faults = (payload.fault(folder, thorough=thorough) for payload in manifest.payloads)
+    return next(filter(None, faults), None)
 
 
 def describe_payloads(folder: Path) -> tuple[Payload, ...]:

@@ -7,11 +7,10 @@ stage resumes there from its checkpoints.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -19,12 +18,17 @@ from pydantic import JsonValue
 
 from mocoflow_core.artifacts import Artifact
 from mocoflow_core.io.full_disk import full_disk_is_bad_input
+from mocoflow_core.io.known_runs import KnownRun
+from mocoflow_core.io.locks import holding
 from mocoflow_core.io.manifest import (
+    MANIFEST,
     Manifest,
     describe_payloads,
+    fault_of,
     flush_to_disk,
     library_versions,
 )
+from mocoflow_core.io.whole_file import whole_file
 from mocoflow_core.io.work_clock import WorkClock
 
 Kind = TypeVar("Kind", bound=Artifact)
@@ -36,17 +40,27 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.root = folder
         self.url = str(folder)
+        self._run: KnownRun | None = None
+
+    def serve(self, run: Path) -> None:
+        """From now on note what this run uses, so that it is kept as long as the run's folder.
+
+        Raises ``InputError`` on a full disk.
+        """
+        self._run = KnownRun.here(run)
+        self.write_run(self._run)
 
     def find(self, kind: type[Kind], key: str) -> Kind | None:
         """The finished artifact; ``None`` where it is absent, incomplete or damaged.
 
         Sizes and digests of all payloads are checked (digests once for an untouched file).
         """
+        return self._look(kind, key)
+
+    def fault(self, kind: type[Kind], key: str) -> str | None:
+        """What is wrong with an artifact that is there and yet not found, in words."""
         folder = self._folder(kind.stage, key)
-        manifest = Manifest.read(folder)
-        if manifest is None or manifest.key != key or not manifest.is_intact(folder):
-            return None
-        return reference_to(kind, manifest, cached=True)
+        return fault_of(folder) if folder.exists() else None
 
     def folder(self, artifact: Artifact) -> Path:
         """The local folder with the payloads of an artifact that was found or just committed."""
@@ -61,12 +75,10 @@ class Store:
         """
         folder = self._folder(kind.stage, key)
         partial = folder.with_name(f"{key}.partial")
-        with (
-            full_disk_is_bad_input(f"The artifact store {self.root}"),
-            _locked(folder.with_name(f"{key}.lock")),
-        ):
-            found = self.find(kind, key)
+        with full_disk_is_bad_input(f"The artifact store {self.root}"), self._locked(folder):
+            found = self._find_locked(kind, key)
             if found is None:
+                self._note_use(kind.stage, key)  # A killed try is needed as well.
                 clear_folder(folder)
                 if not resumes:
                     self._forget_try(partial)
@@ -80,6 +92,39 @@ class Store:
         folder = self._folder(manifest.stage, manifest.key)
         partial.rename(folder)
         _sync_folder(folder.parent)
+
+    def write_run(self, run: KnownRun) -> None:
+        """Write down what a run has used so far. Raises ``InputError`` on a full disk."""
+        file = self.root / run.file
+        with full_disk_is_bad_input(f"The artifact store {self.root}"):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with whole_file(file) as beside:
+                beside.write_bytes(run.content())
+
+    def _look(self, kind: type[Kind], key: str) -> Kind | None:
+        """The finished artifact in the local folder; being looked at makes it young again."""
+        folder = self._folder(kind.stage, key)
+        with suppress(OSError):  # Absent, or a store that may only be read.
+            os.utime(folder / MANIFEST)
+        manifest = Manifest.read(folder)
+        if manifest is None or fault_of(folder):
+            return None
+        self._note_use(kind.stage, key)
+        return reference_to(kind, manifest, cached=True)
+
+    def _find_locked(self, kind: type[Kind], key: str) -> Kind | None:
+        """As ``find``, for who holds the artifact's lock."""
+        return self._look(kind, key)
+
+    def _note_use(self, stage: str, key: str) -> None:
+        name = f"{stage}/{key}"
+        if self._run and name not in self._run.artifacts:
+            self._run = self._run.with_artifact(name)
+            self.write_run(self._run)
+
+    @staticmethod
+    def _locked(folder: Path, *, wait: bool = True) -> AbstractContextManager[bool]:
+        return holding(lock_of(folder), wait=wait)
 
     def _forget_try(self, partial: Path) -> None:
         clear_folder(partial)
@@ -146,6 +191,11 @@ def reference_to(kind: type[Kind], manifest: Manifest, *, cached: bool) -> Kind:
     )
 
 
+def lock_of(folder: Path) -> Path:
+    """The file whose lock is the sole right to make, or remove, an artifact's folder."""
+    return folder.with_name(f"{folder.name}.lock")
+
+
 def clear_folder(folder: Path) -> None:
     """Remove a folder; renamed first, so that a kill leaves no half of it under its name."""
     if folder.exists():
@@ -153,14 +203,6 @@ def clear_folder(folder: Path) -> None:
         shutil.rmtree(rubbish, ignore_errors=True)
         folder.rename(rubbish)
         shutil.rmtree(rubbish)
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 def _sync_folder(folder: Path) -> None:

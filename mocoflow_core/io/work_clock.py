@@ -25,11 +25,13 @@ class WorkClock:
 
     @property
     def wall_s(self) -> float:
-        return self._earlier_wall_s + time.perf_counter() - self._wall_start - self._aside_wall_s
+        worked = time.perf_counter() - self._wall_start - self._aside_wall_s
+        return self._earlier_wall_s + max(worked, 0.0)  # A clock may be put back.
 
     @property
     def cpu_s(self) -> float:
-        return self._earlier_cpu_s + _cpu_seconds() - self._cpu_start - self._aside_cpu_s
+        worked = _cpu_seconds() - self._cpu_start - self._aside_cpu_s
+        return self._earlier_cpu_s + max(worked, 0.0)
 
     def leave_out(self, wall_s: float, cpu_s: float) -> None:
         """Take off what did not go into the artifact, such as looking how good it is by now."""
@@ -47,9 +49,11 @@ class WorkClock:
 
 
 def _read(path: Path) -> tuple[float, float]:
-    if not path.exists():
+    """What was noted; nothing where the note was lost with the machine's power."""
+    try:
+        wall_s, cpu_s = json.loads(path.read_text())
+    except (FileNotFoundError, ValueError, TypeError):
         return 0.0, 0.0
-    wall_s, cpu_s = json.loads(path.read_text())
     return float(wall_s), float(cpu_s)
 
 

@@ -19,8 +19,9 @@ class Seconds:
     def __add__(self, other: Seconds) -> Seconds:
         return Seconds(self.wall + other.wall, self.cpu + other.cpu)
 
-    def __sub__(self, other: Seconds) -> Seconds:
-        return Seconds(self.wall - other.wall, self.cpu - other.cpu)
+    def since(self, earlier: Seconds) -> Seconds:
+        """What has passed in between; nothing by a clock that was put back."""
+        return Seconds(max(self.wall - earlier.wall, 0.0), max(self.cpu - earlier.cpu, 0.0))
 
 
 def now() -> Seconds:
@@ -32,7 +33,7 @@ def unheard(wall_s: float, cpu_s: float) -> None:
 
 
 class TrainingClock:
-    """Runs from its creation on; stops while the scene is evaluated.
+    """Runs from its creation on; stops while the scene is evaluated; never goes back.
 
     Args:
         paused: is told the wall and CPU seconds of each pause, when it ends.
@@ -46,27 +47,29 @@ class TrainingClock:
     ) -> None:
         self._tell = paused
         self._now = now
-        self._start = now()
-        self._pauses = Seconds()
-        self._earlier = Seconds()
+        self._looked = now()
+        self._elapsed = Seconds()
 
     def go_on_from(self, elapsed: Seconds) -> None:
         """Add what earlier tries have used."""
-        self._earlier = elapsed
+        self._elapsed += elapsed
 
     def read(self) -> Seconds:
         """Work so far, earlier tries included."""
-        return self._earlier + (self._now() - self._start - self._pauses)
+        before, self._looked = self._looked, self._now()
+        self._elapsed += self._looked.since(before)
+        return self._elapsed
 
     @contextmanager
     def paused(self) -> Iterator[None]:
         """What happens inside costs no training time."""
-        stopped = self._now()
+        self.read()
+        stopped = self._looked
         try:
             yield
         finally:
-            pause = self._now() - stopped
-            self._pauses += pause
+            self._looked = self._now()
+            pause = self._looked.since(stopped)
             self._tell(pause.wall, pause.cpu)
 
 

@@ -98,28 +98,6 @@ def test_a_moved_store_keeps_its_artifacts(tmp_path):
     assert Store(tmp_path / "there").find(ClipArtifact, KEY)
 
 
-def test_another_machine_finds_what_was_uploaded(tmp_path):
-    compute(open_store("memory://shared", tmp_path / "one"))
-    other = open_store("memory://shared", tmp_path / "two")
-    assert payload(other, other.find(ClipArtifact, KEY)).read_bytes() == b"frames"
-
-
-def test_an_upload_without_its_manifest_is_a_miss(tmp_path):
-    store = open_store("memory://half", tmp_path / "one")
-    compute(store)
-    store._remote.rm_file(f"{store._base}/extract_clip/{KEY}/manifest.json")
-    assert open_store("memory://half", tmp_path / "two").find(ClipArtifact, KEY) is None
-
-
-def test_a_remote_payload_that_was_damaged_is_not_used(tmp_path):
-    store = open_store("memory://damaged", tmp_path / "one")
-    compute(store)
-    store._remote.pipe_file(f"{store._base}/extract_clip/{KEY}/part/frames.npy", b"framez")
-    other = open_store("memory://damaged", tmp_path / "two")
-    assert other.find(ClipArtifact, KEY) is None
-    assert payload(other, compute(other)).read_bytes() == b"frames"
-
-
 def test_an_unknown_address_is_bad_input(tmp_path):
     with pytest.raises(InputError, match="nosuch"):
         open_store("nosuch://bucket", tmp_path)

@@ -119,6 +119,20 @@ def test_a_deleted_payload_is_computed_again_and_what_follows_is_still_valid(sto
     assert cached(run(store, file)) == (False, True)
 
 
+def test_a_damaged_artifact_is_computed_again_and_a_person_is_told(store, file, monkeypatch):
+    told = []
+    monkeypatch.setattr("tasks.stage.terminal_line", told.append)
+    clip, _, _ = run(store, file)
+    assert told == []
+    (store.folder(clip) / "copy.txt").write_text("framez")
+    assert cached(run(store, file)) == (False, True)
+    [line] = told
+    assert line == (
+        f"extract_clip/{clip.key} is damaged and computed again: "
+        "copy.txt has changed since it was written"
+    )
+
+
 def test_an_emptied_store_is_filled_again_whatever_prefect_remembers(store, file, tmp_path):
     run(store, file)
     assert cached(run(Store(tmp_path / "other"), file)) == (False, False)

@@ -9,7 +9,7 @@ from tests.training.slow_clock import SlowClock
 def test_seconds_of_two_tries_add_up():
     total = Seconds(1.0, 3.0) + Seconds(0.5, 0.25)
     assert (total.wall, total.cpu) == (1.5, 3.25)
-    assert total - Seconds(0.5, 0.25) == Seconds(1.0, 3.0)
+    assert total.since(Seconds(0.5, 0.25)) == Seconds(1.0, 3.0)
 
 
 def test_the_clock_counts_work_and_stands_still_in_a_pause():
@@ -40,6 +40,21 @@ def test_a_resumed_clock_goes_on_and_counts_its_own_preparation():
     with clock.paused():
         machine.spend(0.25)
     assert clock.read() == Seconds(8.0, 11.0)
+
+
+def test_a_clock_that_is_put_back_loses_the_jump_and_nothing_else():
+    machine, pauses = SlowClock(), []
+    clock = TrainingClock(lambda *seconds: pauses.append(seconds), machine)
+    machine.spend(3.0)
+    assert clock.read() == Seconds(3.0, 6.0)
+    machine.spend(-500.0)
+    assert clock.read() == Seconds(3.0, 6.0)
+    machine.spend(2.0)
+    with clock.paused():
+        machine.spend(-500.0)
+    machine.spend(1.0)
+    assert clock.read() == Seconds(6.0, 12.0)
+    assert pauses == [(0.0, 0.0)]
 
 
 def snapshots(before_s: float, until_s: float) -> list[float]:

@@ -198,6 +198,35 @@ def test_a_budget_holds_when_the_machine_gets_slower_on_the_way(prepared, tmp_pa
     assert 45 < result.steps < 70
 
 
+@pytest.mark.parametrize("jump_s", [-1e6, 1e6])
+def test_a_clock_that_jumps_ends_in_a_scene_with_a_curve_that_only_grows(
+    prepared, tmp_path, jump_s
+):
+    """Put back, the time so far is kept; put forward, the budget is over and the scene whole."""
+    machine = SlowClock(per_look=0.05)
+    jumps = [jump_s]
+
+    def jump(fraction: float, text: str) -> None:
+        if fraction > 0.4 and jumps:
+            machine.spend(jumps.pop())
+
+    clock = TrainingClock(now=machine)
+    result = train(
+        prepared, tmp_path, schedule=with_budget(3.0), progress=jump, clock=clock, watch=unwatched
+    )
+    assert not jumps
+    assert (45 < result.steps < 75) if jump_s < 0 else (15 < result.steps < 45)
+    assert (result.wall_s < 3.5) if jump_s < 0 else (result.wall_s > 1e6)
+    seconds = [snapshot.wall_s for snapshot in read_snapshots(tmp_path)]
+    assert seconds == sorted(seconds)
+    assert seconds[0] >= 0
+    assert all(torch.isfinite(value).all() for value in parameters(tmp_path).values())
+
+
+def unwatched(curve) -> None:
+    """Snapshots are kept, and shown to nobody."""
+
+
 def test_a_killed_run_with_a_budget_still_ends_on_time(prepared, tmp_path):
     schedule = with_budget(3.0).model_copy(update={"checkpoint_every_s": 0.5})
 

@@ -1,0 +1,107 @@
+"""The commands mocoflow store ls, verify and gc, on a store with a run that is kept and one not."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from typer.testing import CliRunner
+
+from flows.command_line import app
+from mocoflow_core.artifacts import ClipArtifact, PlanArtifact
+from mocoflow_core.io.run_folder import RunFolder, RunRecord, StageRecord
+from mocoflow_core.io.store import Store
+
+CLIP, PLAN = f"extract_clip/{'0' * 40}", f"plan_scene/{'1' * 40}"
+
+
+def said(*words, code=0):
+    result = CliRunner().invoke(app, ["store", *map(str, words)])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def compute(store, kind, name):
+    with store.computing(kind, name.partition("/")[2], resumes=False) as work:
+        (work.path / "payload").write_bytes(1000 * b"x")
+        work.commit(1, {}, {}, {})
+
+
+@pytest.fixture
+def store(tmp_path):
+    """Its clip is needed by a run, its plan by none."""
+    made = Store(tmp_path / "store")
+    compute(made, PlanArtifact, PLAN)
+    begun = RunRecord(
+        request="a", scene="s", scene_path="", preset="toy", seed=0, configuration={}, store=""
+    )
+    RunFolder.claim(tmp_path / "run", begun)
+    made.serve(tmp_path / "run")
+    compute(made, ClipArtifact, CLIP)
+    return made
+
+
+def test_ls_tells_who_needs_what(store, tmp_path):
+    lines = {line.split()[0]: line for line in said("ls", "--store", store.url).splitlines()}
+    assert str(tmp_path / "run") in lines[CLIP]
+    assert "no run" in lines[PLAN]
+    assert "2 artifacts" in lines[f"{store.url}:"]
+
+
+def test_ls_of_an_empty_store_is_one_line(tmp_path):
+    assert said("ls", "--store", tmp_path).splitlines() == [f"{tmp_path}: 0 artifacts, 0 B"]
+
+
+def test_verify_names_what_is_damaged_and_fails(store):
+    assert "Nothing is damaged." in said("verify", "--store", store.url)
+    (store.root / CLIP / "payload").write_bytes(1000 * b"y")
+    output = said("verify", "--store", store.url, code=1)
+    assert f"damaged {CLIP}: payload has changed since it was written" in output
+    assert PLAN not in output
+
+
+def test_verify_names_leftovers_without_failing(store):
+    (store.root / f"{PLAN}.partial").mkdir()
+    output = said("verify", "--store", store.url)
+    assert f"leftover {PLAN}: left by a try that was killed" in output
+
+
+def test_gc_says_what_can_go_and_removes_nothing(store):
+    output = said("gc", "--store", store.url, "--older-than", 0)
+    assert "can go: add --delete." in output
+    assert f"goes  {PLAN}" in output
+    assert f"goes  {CLIP}" not in output
+    assert (store.root / PLAN).is_dir()
+
+
+def test_gc_removes_with_delete_what_no_run_needs(store):
+    assert "freed" in said("gc", "--store", store.url, "--older-than", 0, "--delete")
+    assert not (store.root / PLAN).exists()
+    assert store.find(ClipArtifact, CLIP.partition("/")[2])
+
+
+def test_gc_keeps_what_is_young(store):
+    assert "0 B freed." in said("gc", "--store", store.url, "--delete")
+    assert (store.root / PLAN).is_dir()
+
+
+def test_a_run_that_was_removed_is_named_and_its_artifacts_go(store, tmp_path):
+    shutil.rmtree(tmp_path / "run")
+    output = said("gc", "--store", store.url, "--older-than", 0, "--delete")
+    assert f"no longer there: the run in {tmp_path / 'run'}" in output
+    assert said("ls", "--store", store.url).splitlines() == [f"{store.url}: 0 artifacts, 0 B"]
+    assert list((store.root / "runs").iterdir()) == []
+
+
+def test_a_moved_run_keeps_its_artifacts_where_it_is_named(store, tmp_path):
+    folder = RunFolder(tmp_path / "run", RunRecord.model_validate_json(read(tmp_path / "run")))
+    stage = StageRecord(name="extract_clip", key="0" * 40, wall_s=1.0, cpu_s=1.0, cached=False)
+    folder.finish({"stages": (stage,)})
+    (tmp_path / "run").rename(tmp_path / "moved")
+    words = ("gc", "--store", store.url, "--older-than", 0, "--delete", "--runs")
+    said(*words, tmp_path / "moved", tmp_path / "nothing")
+    assert (store.root / CLIP).is_dir()
+
+
+def read(run):
+    return (run / "run.json").read_text()
