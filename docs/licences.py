@@ -36,12 +36,12 @@ REMARKS = {
     "mocoflow is linked with them beyond Python's import.",
     "certifi": "A list of certificates, used unchanged; MPL-2.0 asks for the source of changed "
     "files alone.",
-    "hypothesis": "Tests alone, used unchanged; MPL-2.0 asks for the source of changed files alone.",
+    "hypothesis": "Used unchanged by tests; MPL-2.0 asks for the source of changed files alone.",
     "opencv-contrib-python-headless": "Its wheels bring FFmpeg under LGPL-2.1, as a library that "
     "can be replaced.",
     "orjson": "Used unchanged by Prefect; MPL-2.0 asks for the source of changed files alone.",
-    "pathspec": "Checks alone, used unchanged; MPL-2.0 asks for the source of changed files alone.",
-    "torch": "Builds for CUDA bring NVIDIA's libraries under NVIDIA's own terms; builds for the CPU "
+    "pathspec": "Used unchanged by mypy; MPL-2.0 asks for the source of changed files alone.",
+    "torch": "Builds for CUDA bring NVIDIA's libraries under NVIDIA's own terms; those for the CPU "
     "do not.",
     "text-unidecode": "Either licence may be chosen; used under the Artistic License, unchanged, "
     "by Prefect's python-slugify.",
@@ -104,7 +104,7 @@ def page() -> str:
         "",
         "mocoflow itself is under Apache-2.0; the weights that come with it are named in its",
         "[notice](../mocoflow_core/perception/weights/NOTICE.md). These are the packages of",
-        "`constraints.txt`, as they describe themselves; `python -m docs.licences` writes this page.",
+        "`constraints.txt`, as they describe themselves; `python -m docs.licences` writes this.",
         "Weights, body models and data sets of others are not among them: see",
         "[datasets](datasets/README.md).",
         "",
