@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test e2e faults stability bench check format
+.PHONY: install demo test e2e faults stability bench check format audit
 
 install: $(INSTALLED)
 
@@ -42,3 +42,10 @@ check: install
 format: install
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# Known vulnerabilities of the pinned packages. Asks pypi.org; a package that it cannot ask about
+# is a failure, as is one that has any. The tool stays out of the project's own environment.
+audit:
+	test -x .venv-audit/bin/pip-audit || $(PYTHON) -m venv .venv-audit
+	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check pip-audit==2.10.1
+	.venv-audit/bin/pip-audit --strict --no-deps --disable-pip -r constraints.txt
