@@ -115,5 +115,6 @@ def reconstruct(
         folder.take(rendered / "mocoflow" / "views", "views")
         folder.take(rendered / "mocoflow" / "opacity", "opacity")
     record = folder.finish({**facts, "stages": records((*stages, report))})
+    where.served()
     show_in_prefect(record, folder.path / "report.html", where.folder(report) / "error_curve.png")
     return record

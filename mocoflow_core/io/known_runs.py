@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import socket
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -32,9 +32,9 @@ class KnownRun(BaseModel):
         return cls(folder=str(folder.resolve()), host=socket.gethostname())
 
     @classmethod
-    def read(cls, content: bytes) -> KnownRun | None:
+    def read(cls, content: bytes | None) -> KnownRun | None:
         try:
-            return cls.model_validate_json(content)
+            return None if content is None else cls.model_validate_json(content)
         except ValidationError:
             return None
 
@@ -47,12 +47,43 @@ class KnownRun(BaseModel):
     def content(self) -> bytes:
         return (self.model_dump_json(indent=1) + "\n").encode()
 
-    def with_artifact(self, name: str) -> KnownRun:
-        return self.model_copy(update={"artifacts": (*self.artifacts, name)})
+    def using(self, artifacts: Iterable[str]) -> KnownRun:
+        return self.model_copy(update={"artifacts": tuple(dict.fromkeys(artifacts))})
 
     def is_kept(self) -> bool:
         """Whether its folder is still there; nobody here can say that another machine's is not."""
         return (Path(self.folder) / RUN).is_file() or self.host != socket.gethostname()
+
+
+class UseLog:
+    """What one run uses, written down as it goes on.
+
+    Args:
+        run: whose uses they are.
+        earlier: what an earlier try in the same folder has written down; kept until the end, as
+            the run may die again before it is where that try was.
+        write: puts a run into the store.
+    """
+
+    def __init__(
+        self, run: KnownRun, earlier: KnownRun | None, write: Callable[[KnownRun], None]
+    ) -> None:
+        self._run = run
+        self._earlier = earlier.artifacts if earlier else ()
+        self._used: list[str] = []
+        self._write = write
+        write(run.using(self._earlier))
+
+    def note(self, name: str) -> None:
+        """The artifact ``<stage>/<key>`` is about to be opened or computed."""
+        if name not in self._used:
+            self._used.append(name)
+            if name not in self._earlier:
+                self._write(self._run.using((*self._earlier, *self._used)))
+
+    def close(self) -> None:
+        """The run is finished: it needs what it has used, and nothing of earlier tries."""
+        self._write(self._run.using(self._used))
 
 
 def runs_below(folders: Iterable[Path]) -> list[KnownRun]:

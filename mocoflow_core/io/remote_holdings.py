@@ -69,7 +69,7 @@ class RemoteHoldings:
 
     def runs(self) -> list[KnownRun]:
         contents = (self._files.read(path) for path in sorted(self._files.below(RUNS)))
-        return [run for content in contents if (run := KnownRun.read(content or b""))]
+        return [run for content in contents if (run := KnownRun.read(content))]
 
     def forget(self, run: KnownRun) -> None:
         self._files.remove([run.file])

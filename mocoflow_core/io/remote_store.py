@@ -83,6 +83,9 @@ class RemoteStore(Store):
         self.files.make_folder(RUNS)
         self.files.write(run.file, run.content())
 
+    def _read(self, name: str) -> bytes | None:
+        return self.files.read(name)
+
     def _share(self, stage: str, key: str) -> None:
         """Upload what the other side lacks: an earlier upload may have been cut off."""
         held = Manifest.parse(self.files.read(address(stage, key, MANIFEST)))

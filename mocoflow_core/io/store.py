@@ -18,7 +18,7 @@ from pydantic import JsonValue
 
 from mocoflow_core.artifacts import Artifact
 from mocoflow_core.io.full_disk import full_disk_is_bad_input
-from mocoflow_core.io.known_runs import KnownRun
+from mocoflow_core.io.known_runs import KnownRun, UseLog
 from mocoflow_core.io.locks import holding
 from mocoflow_core.io.manifest import (
     MANIFEST,
@@ -40,15 +40,20 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.root = folder
         self.url = str(folder)
-        self._run: KnownRun | None = None
+        self._uses: UseLog | None = None
 
-    def serve(self, run: Path) -> None:
-        """From now on note what this run uses, so that it is kept as long as the run's folder.
+    def serve(self, folder: Path) -> None:
+        """From now on note what the run in this folder uses: it is kept as long as the folder.
 
         Raises ``InputError`` on a full disk.
         """
-        self._run = KnownRun.here(run)
-        self.write_run(self._run)
+        run = KnownRun.here(folder)
+        self._uses = UseLog(run, KnownRun.read(self._read(run.file)), self.write_run)
+
+    def served(self) -> None:
+        """The run is finished."""
+        if self._uses:
+            self._uses.close()
 
     def find(self, kind: type[Kind], key: str) -> Kind | None:
         """The finished artifact; ``None`` where it is absent, incomplete or damaged.
@@ -101,6 +106,11 @@ class Store:
             with whole_file(file) as beside:
                 beside.write_bytes(run.content())
 
+    def _read(self, name: str) -> bytes | None:
+        """A small file of the store; ``None`` where there is none."""
+        file = self.root / name
+        return file.read_bytes() if file.exists() else None
+
     def _look(self, kind: type[Kind], key: str) -> Kind | None:
         """The finished artifact in the local folder; being looked at makes it young again."""
         folder = self._folder(kind.stage, key)
@@ -117,10 +127,8 @@ class Store:
         return self._look(kind, key)
 
     def _note_use(self, stage: str, key: str) -> None:
-        name = f"{stage}/{key}"
-        if self._run and name not in self._run.artifacts:
-            self._run = self._run.with_artifact(name)
-            self.write_run(self._run)
+        if self._uses:
+            self._uses.note(f"{stage}/{key}")
 
     @staticmethod
     def _locked(folder: Path, *, wait: bool = True) -> AbstractContextManager[bool]:

@@ -92,6 +92,19 @@ def test_all_that_a_run_uses_is_needed_as_long_as_its_folder_is_there(store, tmp
     assert gone(store, users(place(store).runs())) == [CLIP, PLAN]
 
 
+def test_a_run_that_starts_again_keeps_what_it_had_until_it_is_finished(store, tmp_path):
+    """It may die again before it is where it was."""
+    compute(store)
+    store.serve(run_in(tmp_path / "run"))
+    store.find(ClipArtifact, KEY)
+    store.serve(tmp_path / "run")
+    assert users(place(store).runs()).keys() == {CLIP}
+    compute(store, PlanArtifact, OTHER)
+    assert users(place(store).runs()).keys() == {CLIP, PLAN}
+    store.served()
+    assert users(place(store).runs()).keys() == {PLAN}
+
+
 def test_a_run_of_another_machine_keeps_what_it_needs(store, tmp_path):
     compute(store)
     elsewhere = KnownRun(folder="/nowhere/run", host="another", artifacts=(CLIP,))
