@@ -12,7 +12,8 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from flows.allowed_folders import AllowedFolders
 from flows.benchmark_scenes import AskedScene, read_scenes
-from flows.request import Request, open_users_store
+from flows.request import Request
+from flows.users_store import open_users_store
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.store import Store
 from mocoflow_core.methods.ablations import SETTINGS, require_method

@@ -76,7 +76,7 @@ def export(
 
 def _trained_scene(run: Path) -> tuple[RunRecord, Path]:
     """The record of a finished run and the folder of its trained scene, or InputError."""
-    from flows.request import open_users_store
+    from flows.users_store import open_users_store
     from mocoflow_core.artifacts import SceneArtifact
     from mocoflow_core.io.run_folder import read_run
 

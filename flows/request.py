@@ -11,14 +11,14 @@ from flows.allowed_folders import AllowedFolders
 from flows.demo_scene import named_demo
 from flows.imported_scene import scene_folder
 from flows.stopping import read_target
-from flows.user_folders import body_models_folder, cache_folder
+from flows.user_folders import body_models_folder
+from flows.users_store import open_users_store
 from mocoflow_core.capture.extract import select_training_frames
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.contradictions import require_sense
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.model_choice import choose_model
 from mocoflow_core.io.content_key import key_of
-from mocoflow_core.io.remote_store import open_store
 from mocoflow_core.io.run_folder import RunFolder, RunRecord
 from mocoflow_core.io.store import Store
 from mocoflow_core.presets import PRESETS, Configuration
@@ -28,12 +28,6 @@ from tasks.source import Source, clip_source, evaluation_source, file_source, me
 
 # Counts up when a finished folder of an earlier version must not be taken for a finished one.
 REQUEST_VERSION = 1
-
-
-def open_users_store(url: str | None) -> Store:
-    """The store at an address, by default ``MOCOFLOW_STORE`` or the one in the user's cache."""
-    address = AllowedFolders.of_environment().to_keep(url)
-    return open_store(address or str(cache_folder() / "store"), cache_folder() / "mirrors")
 
 
 class Request(BaseModel):
