@@ -3,7 +3,13 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test e2e faults stability bench check format audit
+# make up DB=postgresql PORT=4201 STATE=/srv/mocoflow
+DB ?= sqlite
+PORT ?= 4200
+SITE = $(BIN)/python -m flows.production
+STATE_FOLDER = $(if $(STATE),--state $(STATE))
+
+.PHONY: install demo up down test e2e faults stability bench check format audit
 
 install: $(INSTALLED)
 
@@ -14,6 +20,13 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 demo: install
 	$(BIN)/mocoflow demo --out demo
+
+# A Prefect server with its database, all deployments and a worker, until `make down`.
+up: install
+	$(SITE) up --database $(DB) --port $(PORT) $(STATE_FOLDER)
+
+down: install
+	$(SITE) down $(STATE_FOLDER)
 
 # A file's tests stay together: they share what they make.
 test: install

@@ -78,7 +78,7 @@ def reconstruct(
     )
     folder = request.claim(out or folder_of_this_run())
     where, chosen = request.store, request.configuration
-    where.serve(out)
+    where.serve(folder.path)
 
     prepared = prepare(request)
     show_plan(request, prepared.plan)

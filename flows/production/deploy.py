@@ -1,4 +1,4 @@
-"""Bring a server up to date: work pool, queues, automation, deployments, schedules."""
+"""Bring a server up to date: work pool, queues, automation, store, deployments, schedules."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from prefect.workers.process import ProcessWorker
 
 from flows.data_set_roots import ROOTS, configured_roots
 from flows.production.site import PREFECT
+from flows.production.stores import make_store
 from mocoflow_core.errors import InputError
 
 FOLDER = Path("deployments")
@@ -29,6 +30,7 @@ def deploy() -> list[str]:
     Raises InputError outside of the repository's root.
     """
     pool, zombies = _read("pool.yaml"), _read("zombies.yaml")
+    make_store()
     with get_client(sync_client=True) as client:
         _make_pool(client, pool)
         for queue in pool["queues"]:

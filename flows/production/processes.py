@@ -17,10 +17,7 @@ def start(
     site: Site, name: str, command: Sequence[str], environment: Mapping[str, str]
 ) -> subprocess.Popen[bytes]:
     """Start a process of the site in a session of its own, its output in the site's logs."""
-    # Whoever was started with `&` by a script ignores interrupts, and so would the process, to
-    # which Prefect's worker sends one to end.
-    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    heed_interrupts()
     with (site.logs / f"{name}.log").open("ab") as log:
         process = subprocess.Popen(
             command,
@@ -33,6 +30,16 @@ def start(
         )
     site.pid_file(name).write_text(f"{process.pid} {_started_at(process.pid)}\n")
     return process
+
+
+def heed_interrupts() -> None:
+    """Let processes that are started from now on end at an interrupt.
+
+    Whoever was started with ``&`` by a script ignores interrupts, and so does what they start: a
+    worker, which Prefect ends by interrupting it, would not.
+    """
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def is_running(site: Site, name: str) -> bool:
@@ -88,8 +95,6 @@ def _gone(pid: int, within_s: float) -> bool:
     while _started_at(pid):
         if time.monotonic() > end:
             return False
-        with suppress(ChildProcessError):
-            os.waitpid(pid, os.WNOHANG)
         time.sleep(0.1)
     return True
 

@@ -71,6 +71,8 @@ class Site:
             "PREFECT_API_URL": self.api,
             "PREFECT_UI_URL": self.pages,
             "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+            # The second version of the pages asks hosts elsewhere.
+            "PREFECT_SERVER_UI_V2_ENABLED": "false",
             "DO_NOT_TRACK": "1",
             "PREFECT_FLOWS_HEARTBEAT_FREQUENCY": "30",
             "NO_COLOR": "1",

@@ -9,7 +9,8 @@ import pytest
 
 from flows.allowed_folders import AllowedFolders
 from flows.benchmark_request import BenchmarkRequest
-from flows.request import Request, open_users_store
+from flows.request import Request
+from flows.users_store import open_users_store
 from mocoflow_core.errors import InputError
 
 
