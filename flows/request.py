@@ -21,6 +21,7 @@ from mocoflow_core.estimators.model_choice import choose_model
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.run_folder import RunFolder, RunRecord
 from mocoflow_core.io.store import Store
+from mocoflow_core.metrics.person_judge import require_own_networks
 from mocoflow_core.presets import PRESETS, Configuration
 from mocoflow_core.settings import with_settings
 from mocoflow_core.training.devices import Devices, choose_devices
@@ -128,6 +129,7 @@ class Request(BaseModel):
     def check(self) -> None:
         """Raise InputError for what settings and file names show to be wrong, before any work."""
         select_training_frames(self.scene, self.configuration.capture)
+        require_own_networks(self.configuration.person_scores)
         _ = self.bodies, self.body_model, self.faces, self.processes
 
     def claim(self, out: Path) -> RunFolder:

@@ -17,6 +17,7 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.video_facts import read_video_facts
 from mocoflow_core.perception.blazepose import BlazePose
+from mocoflow_core.perception.own_networks import own_segmenter
 from mocoflow_core.video.camera_check import require_movement, require_still_camera
 from mocoflow_core.video.clip_frames import ClipFrames, choose_frames
 from mocoflow_core.video.configuration import VideoConfig
@@ -52,6 +53,8 @@ def read_bare_video(
     """
     if not path.is_file():
         raise InputError("a video file", f"nothing at {path}", "Check the path.")
+    own = configuration.segmenter
+    segmenter = None if own is None else own_segmenter(own)
     facts = read_video_facts(path)
     frames, rate_said = choose_frames(path, facts, configuration)
     person = follow_person(
@@ -68,7 +71,8 @@ def read_bare_video(
     require_movement(pictures[checked], covered[checked])
     _, motion_said = require_still_camera(pictures[checked], covered[checked])
     masks = mask_person(
-        frames, frames.rate, person, learned, plate, configuration.least_difference, progress
+        *(frames, frames.rate, person, learned, plate, configuration.least_difference),
+        *(progress, segmenter),
     )
     camera, lens_said = camera_of_video(
         CAMERA, frames.video_size, frames.size, configuration.focal_px, facts.metadata
@@ -85,6 +89,7 @@ def read_bare_video(
         *person.remarks,
         *_cut_off(person, frames),
         motion_said,
+        *([f"masks by {segmenter.name} {segmenter.digest[:12]}"] if segmenter else []),
         lens_said,
         *fit_said,
     )

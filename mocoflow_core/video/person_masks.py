@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mocoflow_core.capture.background import background_plate
 from mocoflow_core.capture.frame_source import FrameSource, Image
 from mocoflow_core.perception.blazepose_landmarks import Pose
+from mocoflow_core.perception.person import PersonSegmenter
 from mocoflow_core.video.followed_person import FollowedPerson, Progress
 
 Mask = NDArray[np.bool_]  # (H, W)
@@ -86,10 +87,12 @@ def mask_person(
     plate: NDArray[np.uint8],
     least_difference: int,
     progress: Progress,
+    segmenter: PersonSegmenter | None = None,
 ) -> PackedMasks:
     """A mask for every frame, from the network and the difference to the plate.
 
-    The mask of a frame that is ``learned`` (T,) from comes from such frames alone.
+    The mask of a frame that is ``learned`` (T,) from comes from such frames alone. A ``segmenter``
+    takes the place of the network that found the pose, where it finds the person.
     """
     shape = plate.shape[:2]
     reach = int(rate * LONGEST_STEP_S)
@@ -97,6 +100,8 @@ def mask_person(
     for row, (_, picture) in enumerate(frames.read(frames.indices.tolist())):
         around = [person.poses[near] for near in neighbours(row, learned, reach)]
         probability = _steady(person.poses[row], around, shape)
+        if segmenter is not None:
+            probability = _segmented(segmenter, picture, person.poses[row], probability)
         if not person.seen[row]:
             probability = np.full_like(probability, 0.5) * (probability > 0)
         mask = refine(probability, picture, plate, least_difference)
@@ -136,6 +141,16 @@ def _steady(pose: Pose, around: list[Pose], shape: tuple[int, ...]) -> Probabili
     beside = [near.mask(shape[0], shape[1])[unsure] for near in around]
     here[unsure] = np.median(np.stack([here[unsure], *beside]), axis=0)
     return here
+
+
+def _segmented(
+    segmenter: PersonSegmenter, picture: Image, pose: Pose, otherwise: Probability
+) -> Probability:
+    """What a segmenter says of the person of a pose; where it sees nobody, what was said before."""
+    places = pose.keypoints.places
+    box = np.concatenate((places.min(axis=0), places.max(axis=0)))
+    (found,) = segmenter.masks([picture], [box])
+    return found if found.any() else otherwise
 
 
 def _without_pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:

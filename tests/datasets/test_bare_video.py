@@ -14,7 +14,7 @@ from mocoflow_core.io.video import write_video
 from mocoflow_core.video.configuration import VideoConfig
 from tests.lossless_video import write_lossless
 from tests.one_thread import one_thread  # noqa: F401
-from tests.squat_pictures import empty_room, squat_pictures
+from tests.squat_pictures import squat_pictures
 
 # A quarter of the video's size: enough for one who fills the picture.
 SIZE = (180, 320)
@@ -26,7 +26,6 @@ def small(picture):
 
 
 PERSON = [small(picture) for picture in squat_pictures()]
-ROOM = small(empty_room())
 MOVING = [PERSON[row] for row in (0, 1, 2, 1, 0, 1, 2, 1, 0, 1)]
 
 
@@ -68,26 +67,6 @@ def test_a_file_is_a_video_and_a_folder_is_none(tmp_path):
     with pytest.raises(InputError, match="known data set") as refused:
         kind_of("auto", tmp_path)
     assert "video lacks" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("pictures", "line"),
-    [
-        ([ROOM] * 10, "nobody in the video"),
-        ([np.hstack((p, p[:, ::-1])) for p in MOVING], "2 of a size. Choose one: --person 0: "),
-        (
-            MOVING[:4] + [ROOM] * 9,
-            "from 0.0 to 0.3 s of the video, in 4 of 13 frames. Choose that part: --clip 0.0-0.3.",
-        ),
-        (MOVING[:2], "at least 10 frames, got 2"),
-    ],
-    ids=["nobody", "two", "leaves", "two frames"],
-)
-def test_a_video_of_no_use_is_refused_in_one_line(tmp_path, pictures, line):
-    with pytest.raises(InputError) as refused:
-        read_bare_video(written(tmp_path / "film.mp4", pictures), QUICK)
-    assert line in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 def test_a_text_is_no_video(tmp_path):
