@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import subprocess
 import sys
@@ -16,15 +17,18 @@ from mocoflow_core.errors import InputError
 
 POOL = "mocoflow"
 RUNS_AT_ONCE = 2
+WORKER_SETTINGS = "worker.json"
 UNDER_WAY = ("RUNNING", "PENDING", "CANCELLING")
 
 
 def bring_up(site: Site) -> Iterator[str]:
     """Start what is not running yet, deploy, and say what was done.
 
-    Raises InputError for a port that is taken and for another database than the running one.
+    Raises InputError for a port that is taken, and for another database or other folders than
+    what is running has.
     """
     _require_the_same(site)
+    _require_the_same_worker(site)
     site.folder.mkdir(parents=True, exist_ok=True)
     site.logs.mkdir(exist_ok=True)
     site.save()
@@ -41,6 +45,7 @@ def bring_up(site: Site) -> Iterator[str]:
     if not is_running(site, "worker"):
         words = ["worker", "start", "--pool", POOL, "--name", _worker()]
         limit = ["--limit", str(RUNS_AT_ONCE)]
+        (site.folder / WORKER_SETTINGS).write_text(json.dumps(_settings(site)) + "\n")
         start(site, "worker", [*PREFECT, *words, *limit], site.environment())
     _require(wait_for(lambda: _is_online(site), 120.0), site, "worker")
     roots = site.environment()
@@ -114,3 +119,22 @@ def _require_the_same(site: Site) -> None:
             f"{site.database} on {site.port}",
             "Take it down first: make down.",
         )
+
+
+def _require_the_same_worker(site: Site) -> None:
+    """A schedule that is due would otherwise find a worker without the data set's root."""
+    if not is_running(site, "worker"):
+        return
+    before, now = json.loads((site.folder / WORKER_SETTINGS).read_text()), _settings(site)
+    differ = sorted(name for name in before | now if before.get(name) != now.get(name))
+    if differ:
+        raise InputError(
+            "the settings that the running worker was started with",
+            f"another {', '.join(differ)}",
+            "Take it down first: make down.",
+        )
+
+
+def _settings(site: Site) -> dict[str, str]:
+    """What runs are told about folders and stores."""
+    return {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")}

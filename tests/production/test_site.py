@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from flows.production.postgresql import find_programs
@@ -65,3 +67,15 @@ def test_a_running_site_is_not_changed_into_another_one(tmp_path, monkeypatch):
     monkeypatch.setattr("flows.production.up.is_running", lambda *_: True)
     with pytest.raises(InputError, match="make down"):
         next(bring_up(Site(tmp_path, 4321, Database.POSTGRESQL)))
+
+
+def test_a_running_worker_is_not_left_without_a_root_that_is_new(tmp_path, monkeypatch):
+    site = Site(tmp_path, 4321)
+    site.save()
+    monkeypatch.delenv("MOCOFLOW_AIST_ROOT", raising=False)
+    settings = {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")}
+    (tmp_path / "worker.json").write_text(json.dumps(settings))
+    monkeypatch.setattr("flows.production.up.is_running", lambda *_: True)
+    monkeypatch.setenv("MOCOFLOW_AIST_ROOT", "/sets/aist")
+    with pytest.raises(InputError, match=r"another MOCOFLOW_AIST_ROOT\. Take it down"):
+        next(bring_up(site))
