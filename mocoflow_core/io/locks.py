@@ -32,11 +32,15 @@ def holding(path: Path, *, wait: bool = True) -> Iterator[bool]:
 
 
 def is_held(path: Path) -> bool:
-    """Whether a process holds a lock right now."""
-    if not path.exists():
+    """Whether a process holds a lock right now; the folder may be one that is only read."""
+    try:
+        with path.open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
         return False
-    with holding(path, wait=False) as free:
-        return not free
+    except BlockingIOError:
+        return True
+    return False
 
 
 def _is_named(file: IO[str], path: Path) -> bool:

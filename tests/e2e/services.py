@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from urllib.error import HTTPError, URLError
 from urllib.request import urlopen
@@ -17,6 +18,7 @@ from urllib.request import urlopen
 from tests.e2e.production import POOL, ROOT, Production
 from tests.free_port import free_port
 
+DEPLOYMENTS = "deployments/prefect.yaml"
 ENDED = ("COMPLETED", "FAILED", "CRASHED", "CANCELLED")
 
 
@@ -81,7 +83,7 @@ class Services:
 
     def start_server(self) -> None:
         self.server.start()
-        until(lambda: answers(self.made.url + "/health"), 180.0, "the server answers")
+        until(lambda: answers(self.made.url + "/health"), 300.0, "the server answers")
 
 
 @contextmanager
@@ -117,8 +119,9 @@ def services(root: Path, database: str | None = None) -> Iterator[Services]:
     )
     try:
         together.start_server()
-        made.prefect("work-pool", "create", POOL, "--type", "process")
-        made.prefect("--no-prompt", "deploy", "--all", "--prefect-file", "deployments/prefect.yaml")
+        patiently = partial(made.prefect, wait_s=400.0)
+        patiently("work-pool", "create", POOL, "--type", "process")
+        patiently("--no-prompt", "deploy", "-n", "full", "--prefect-file", DEPLOYMENTS)
         together.worker.start()
         yield together
     finally:
