@@ -42,6 +42,8 @@ def on_two(deployed, tmp_path_factory):
 def benchmark(deployed, folder: Path, scenes: list[Path], *words: str):
     """A benchmark as a person starts it; it is gone after the block."""
     asked = ["--scenes", *map(str, scenes), "--presets", "toy", "--methods", "mocoflow"]
+    # What is scored takes longer than all the rest.
+    asked += ["--set", "evaluation.frames_per_camera=1"]
     places = ["--out", str(folder / "out"), "--store", str(folder / "store")]
     process = subprocess.Popen(
         [sys.executable, "-c", MAIN, "benchmark", *asked, *places, *words],
@@ -186,7 +188,7 @@ def test_a_cell_whose_process_dies_is_run_again_and_shown(deployed, scene, tmp_p
     with benchmark(deployed, tmp_path, [scene], *asked) as process:
         wait_for_running(deployed, out, process, *NAMES)
         os.kill(workers_of(process)[0], signal.SIGKILL)
-        said, _ = process.communicate(timeout=300.0)
+        said, _ = process.communicate(timeout=400.0)
     assert process.returncode == 0, said
     assert {cell["state"] for cell in cells_of(out).values()} == {"finished"}
     states = states_by_name(deployed, out)
@@ -207,12 +209,12 @@ def test_an_interrupted_benchmark_leaves_no_process_and_no_run(deployed, scene, 
     assert states.keys() <= {"CANCELLED", "CRASHED"}
 
 
-def test_a_dask_worker_that_dies_costs_one_try(deployed, scene, on_two, on_dask, tmp_path):
+def test_a_dask_worker_that_dies_costs_one_try(deployed, scene, on_two, tmp_path):
     out, asked = tmp_path / "out", ("--seeds", "2", "--dask", on_two.address, "--slots", "GPU")
     with benchmark(deployed, tmp_path, [scene], *asked) as process:
         wait_for_running(deployed, out, process, *NAMES)
         on_two.kill("w0")
-        said, _ = process.communicate(timeout=300.0)
+        said, _ = process.communicate(timeout=400.0)
     assert process.returncode == 0, said
     assert {cell["state"] for cell in cells_of(out).values()} == {"finished"}
     states = states_by_name(deployed, out)
@@ -223,7 +225,7 @@ def test_one_cell_on_dask_is_cancelled_and_the_other_finishes(deployed, scene, o
     out, asked = tmp_path / "out", ("--seeds", "2", "--dask", on_two.address)
     with benchmark(deployed, tmp_path, [scene], *asked) as process:
         deployed.cancel(wait_for_running(deployed, out, process, NAMES[0])[NAMES[0]]["id"])
-        said, _ = process.communicate(timeout=300.0)
+        said, _ = process.communicate(timeout=400.0)
     assert process.returncode == 0, said
     assert {name: cell["state"] for name, cell in cells_of(out).items()} == {
         NAMES[0]: "cancelled",
