@@ -56,7 +56,7 @@ format: install
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Known vulnerabilities of the pinned packages. Asks pypi.org; a package that it cannot ask about
+# Known vulnerabilities of the pinned packages. Asks the network; a package that it cannot ask about
 # is a failure, as is one that has any. The tool stays out of the project's own environment.
 audit:
 	test -x .venv-audit/bin/pip-audit || $(PYTHON) -m venv .venv-audit

@@ -21,7 +21,8 @@ from mocoflow_core.methods.ablations import SETTINGS, require_method
 from mocoflow_core.methods.benchmark_folder import BenchmarkFolder, BenchmarkRecord, CellRecord
 from mocoflow_core.methods.experiments import EXPERIMENTS, USUAL, Experiment
 from mocoflow_core.methods.scoring import METHODS
-from mocoflow_core.metrics.time_to_target import TargetConfig, read_target
+from mocoflow_core.metrics.person_judge import require_own_networks
+from mocoflow_core.metrics.time_to_target import TargetConfig, read_target, require_measured
 from mocoflow_core.presets import PRESETS
 from mocoflow_core.settings import with_settings
 
@@ -196,11 +197,12 @@ class BenchmarkRequest(BaseModel):
                 "posed_mesh alone is scored within the runs of another method.",
             )
         for preset in self.presets:
-            with_settings(PRESETS[preset](), self.settings)
+            person = with_settings(PRESETS[preset](), self.settings).person_scores
+            require_own_networks(person)
+            require_measured(self.waited_for, person.on_curve and person.use != "off")
         refusals = [self._refusal(p, m) for p in self.presets for m in self._running()]
         if refusals and all(refusals):
             raise next(filter(None, refusals))
-        _ = self.waited_for
         self.runs_on.check()
 
 

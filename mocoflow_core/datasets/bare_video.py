@@ -63,15 +63,15 @@ def read_bare_video(
     )
     frames = frames.part(person.first, person.last)
     working_fps = _working_fps(frames.rate, configuration.working_fps)
-    learned = learned_frames(frames, working_fps)
+    usable = usable_frames(frames, working_fps)
     plate, pictures, covered = make_plate(
-        frames, person, learned, frames.size, configuration.plate_frames
+        frames, person, usable, frames.size, configuration.plate_frames
     )
     checked = np.unique(np.linspace(0, len(pictures) - 1, CHECKED_FRAMES).round().astype(int))
     require_movement(pictures[checked], covered[checked])
     _, motion_said = require_still_camera(pictures[checked], covered[checked])
     masks = mask_person(
-        *(frames, frames.rate, person, learned, plate, configuration.least_difference),
+        *(frames, frames.rate, person, usable, plate, configuration.least_difference),
         *(progress, segmenter),
     )
     camera, lens_said = camera_of_video(
@@ -80,12 +80,12 @@ def read_bare_video(
     meshes = None
     fit_said: tuple[str, ...] = ("bodies are left out: give an estimate with --meshes",)
     if configuration.bodies == "fitted":
-        fitted = _fit(person, masks, learned, camera, frames, configuration, progress)
+        fitted = _fit(person, masks, usable, camera, frames, configuration, progress)
         meshes = DatasetMeshes(fitted.meshes, "world", True, "fitted to landmarks and outlines")
         fit_said = _about(fitted)
     said = (
         rate_said,
-        *_held_back(learned),
+        *_held_back(usable),
         *person.remarks,
         *_cut_off(person, frames),
         motion_said,
@@ -109,19 +109,19 @@ def read_bare_video(
     )
 
 
-def learned_frames(frames: ClipFrames, working_fps: float) -> NDArray[np.bool_]:
-    """Which frames (T,) a run at the working rate learns from; it may score itself on others."""
+def usable_frames(frames: ClipFrames, working_fps: float) -> NDArray[np.bool_]:
+    """Which frames (T,) no run at the working rate may hold out to score itself."""
     indices = frames.indices
-    selection = select_frames(indices, frames.rate, working_fps, indices[:0], 0, 0)
-    return np.isin(indices, selection.working)
+    selection = select_frames(indices, frames.rate, working_fps, indices, len(indices), 0)
+    return ~np.isin(indices, selection.held_out)
 
 
-def _held_back(learned: NDArray[np.bool_]) -> tuple[str, ...]:
-    if learned.all():
+def _held_back(usable: NDArray[np.bool_]) -> tuple[str, ...]:
+    if usable.all():
         return ()
     return (
-        f"the background, the masks and the body are made from {learned.sum()} frames; "
-        f"{(~learned).sum()} between them may serve for scoring, and their bodies are bridged",
+        f"the background, the masks and the body are made from {usable.sum()} frames; "
+        f"{(~usable).sum()} between them may be held out for scoring, and their bodies are bridged",
     )
 
 
@@ -133,7 +133,7 @@ def _working_fps(rate: float, wanted: float) -> float:
 def _fit(
     person: FollowedPerson,
     masks: PackedMasks,
-    learned: NDArray[np.bool_],
+    usable: NDArray[np.bool_],
     camera: Camera,
     frames: ClipFrames,
     configuration: VideoConfig,
@@ -154,7 +154,7 @@ def _fit(
         configuration.body,
         frames.indices,
         UP_VECTORS[UP],
-        learned,
+        usable,
         progress,
     )
 

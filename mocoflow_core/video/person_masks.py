@@ -63,17 +63,17 @@ def rough_masks(person: FollowedPerson, rows: NDArray[np.integer], size: tuple[i
 def make_plate(
     frames: FrameSource,
     person: FollowedPerson,
-    learned: NDArray[np.bool_],
+    usable: NDArray[np.bool_],
     size: tuple[int, int],
     most: int,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], Mask]:
     """The background (H, W, 3), and the frames (N, H, W, 3) and masks that it is made of.
 
-    ``learned``: (T,) frames that may be looked at, the first among them.
+    ``usable``: (T,) frames that may be looked at, the first among them.
     """
-    usable = np.flatnonzero(learned & person.seen)
-    spread = np.linspace(0, len(usable) - 1, min(most, len(usable))).round().astype(int)
-    rows = usable[np.unique(spread)]
+    shown = np.flatnonzero(usable & person.seen)
+    spread = np.linspace(0, len(shown) - 1, min(most, len(shown))).round().astype(int)
+    rows = shown[np.unique(spread)]
     pictures = np.stack([picture for _, picture in frames.read(frames.indices[rows].tolist())])
     masks = rough_masks(person, rows, size)
     return background_plate(pictures, masks, round(PLATE_MARGIN * max(size))), pictures, masks
@@ -83,7 +83,7 @@ def mask_person(
     frames: FrameSource,
     rate: float,
     person: FollowedPerson,
-    learned: NDArray[np.bool_],
+    usable: NDArray[np.bool_],
     plate: NDArray[np.uint8],
     least_difference: int,
     progress: Progress,
@@ -91,14 +91,14 @@ def mask_person(
 ) -> PackedMasks:
     """A mask for every frame, from the network and the difference to the plate.
 
-    The mask of a frame that is ``learned`` (T,) from comes from such frames alone. A ``segmenter``
-    takes the place of the network that found the pose, where it finds the person.
+    Masks of ``usable`` frames (T,) come from such frames alone, those of held-out ones from all. A
+    ``segmenter`` takes the place of the network that found the pose, where it finds the person.
     """
     shape = plate.shape[:2]
     reach = int(rate * LONGEST_STEP_S)
     packed = []
     for row, (_, picture) in enumerate(frames.read(frames.indices.tolist())):
-        around = [person.poses[near] for near in neighbours(row, learned, reach)]
+        around = [person.poses[near] for near in neighbours(row, usable, reach)]
         probability = _steady(person.poses[row], around, shape)
         if segmenter is not None:
             probability = _segmented(segmenter, picture, person.poses[row], probability)
@@ -122,9 +122,9 @@ def refine(
     return _without_holes(_without_pieces(mask))
 
 
-def neighbours(row: int, learned: NDArray[np.bool_], reach: int) -> list[int]:
+def neighbours(row: int, usable: NDArray[np.bool_], reach: int) -> list[int]:
     """The rows before and after one that may help it; none where one of them is out of reach."""
-    may_help = np.flatnonzero(learned) if learned[row] else np.arange(len(learned))
+    may_help = np.flatnonzero(usable) if usable[row] else np.arange(len(usable))
     place = int(np.searchsorted(may_help, row))
     if not 0 < place < len(may_help) - 1:
         return []

@@ -69,7 +69,7 @@ def test_packed_masks_come_back_by_number():
     assert np.array_equal(read[9], masks[2])
 
 
-def test_a_mask_that_is_learned_from_is_steadied_by_such_frames_alone():
+def test_a_mask_is_steadied_by_no_frame_that_may_be_held_out():
     every_second = np.arange(7) % 2 == 0
     assert neighbours(2, every_second, reach=1) == []
     assert neighbours(2, every_second, reach=2) == [0, 4]

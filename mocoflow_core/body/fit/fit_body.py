@@ -87,7 +87,7 @@ def fit_body(
     configuration: BodyFitConfig,
     frame_indices: NDArray[np.int32] | None = None,
     up_world: Array | None = None,
-    learned: NDArray[np.bool_] | None = None,
+    usable: NDArray[np.bool_] | None = None,
     progress: Progress = lambda fraction, text: None,
 ) -> FittedBody:
     """The likeliest movement of one person, given landmarks and masks of an evenly timed clip.
@@ -101,15 +101,15 @@ def fit_body(
         masks: (T, H, W), an empty one says nothing; None leaves the outlines out.
         camera: a pinhole of the landmarks' pixels.
         up_world: (3,) where it is known; people mostly stand upright.
-        learned: (T,) frames that may be looked at, None all; the others are bridged like frames
+        usable: (T,) frames that may be looked at, None all; the others are bridged like frames
             without anybody.
 
     Raises InputError for sizes that disagree.
     """
     _check(sightings, masks, camera)
-    if learned is not None:
-        sightings = sightings.of_frames(learned)
-        masks = None if masks is None else masks & learned[:, None, None]
+    if usable is not None:
+        sightings = sightings.of_frames(usable)
+        masks = None if masks is None else masks & usable[:, None, None]
     body = FittableBody.load()
     prior = _prior(body, camera, fps, configuration, up_world, float(sightings.seen.mean()))
     up = -np.array([0.0, 1.0, 0.0]) if prior.up is None else prior.up
@@ -127,7 +127,7 @@ def fit_body(
         outlines = MaskOutlines.of(body, masks, camera, configuration.masks)
         pose = _onto_masks(outlines, [prior, close], pose, configuration, progress)
         overlaps = outlines.overlaps(pose)
-    missed = ~sightings.seen if learned is None else learned & ~sightings.seen
+    missed = ~sightings.seen if usable is None else usable & ~sightings.seen
     warnings = _warnings(missed, overlaps, body.reading("stature_m", pose.shape), sized)
     return _fitted(body, pose, sightings, overlaps, camera, frame_indices, warnings)
 
