@@ -3,7 +3,13 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-.PHONY: install demo test e2e faults stability bench check format
+# make up DB=postgresql PORT=4201 STATE=/srv/mocoflow
+DB ?= sqlite
+PORT ?= 4200
+SITE = $(BIN)/python -m flows.production
+STATE_FOLDER = $(if $(STATE),--state $(STATE))
+
+.PHONY: install demo up down test e2e faults stability bench check format audit
 
 install: $(INSTALLED)
 
@@ -14,6 +20,13 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 demo: install
 	$(BIN)/mocoflow demo --out demo
+
+# A Prefect server with its database, all deployments and a worker, until `make down`.
+up: install
+	$(SITE) up --database $(DB) --port $(PORT) $(STATE_FOLDER)
+
+down: install
+	$(SITE) down $(STATE_FOLDER)
 
 # A file's tests stay together: they share what they make.
 test: install
@@ -42,3 +55,10 @@ check: install
 format: install
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# Known vulnerabilities of the pinned packages. Asks the network; a package that it cannot ask about
+# is a failure, as is one that has any. The tool stays out of the project's own environment.
+audit:
+	test -x .venv-audit/bin/pip-audit || $(PYTHON) -m venv .venv-audit
+	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check pip-audit==2.10.1
+	.venv-audit/bin/pip-audit --strict --no-deps --disable-pip -r constraints.txt

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.capture.scene import Scene, open_scene
+from mocoflow_core.datasets.bare_video import usable_frames
 from mocoflow_core.io.video_facts import read_video_facts
 from mocoflow_core.perception.blazepose import BlazePose
 from mocoflow_core.video.camera_check import require_still_camera
@@ -66,13 +67,18 @@ def main() -> None:
     begun = time.process_time()
     facts = read_video_facts(video)
     frames, said = choose_frames(video, facts, configuration)
-    person = follow_person(frames, frames.rate, None, BlazePose(), silent)
+    person = follow_person(frames, frames.rate, 0.0, None, BlazePose(), silent)
     frames = frames.part(person.first, person.last)
     followed = time.process_time()
-    plate, pictures, covered = make_plate(frames, person, frames.size, configuration.plate_frames)
+    usable = usable_frames(frames, scene.description.working_fps)
+    plate, pictures, covered = make_plate(
+        frames, person, usable, frames.size, configuration.plate_frames
+    )
     _, motion = require_still_camera(pictures[::4], covered[::4])
     plated = time.process_time()
-    masks = mask_person(frames, frames.rate, person, plate, configuration.least_difference, silent)
+    masks = mask_person(
+        frames, frames.rate, person, usable, plate, configuration.least_difference, silent
+    )
     masked = time.process_time()
     print(said, person.remarks, motion, sep="\n")
     count = len(person.poses)

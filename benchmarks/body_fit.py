@@ -30,6 +30,7 @@ from mocoflow_core.synthetic.background import render_background
 from mocoflow_core.synthetic.camera_ring import camera_ring
 from mocoflow_core.synthetic.catalogue import named_scene
 from mocoflow_core.synthetic.person import Person
+from mocoflow_core.synthetic.recording import Performance
 from mocoflow_core.synthetic.renderer import FrameRenderer
 from mocoflow_core.synthetic.scene_writer import perform
 
@@ -93,6 +94,22 @@ def fit(
     print(row(name, found, filmed.keypoints, fitted.silhouette_iou, rest), flush=True)
 
 
+def fit_held_out(name: str) -> None:
+    """At 30 frames a second, with the frames half-way between working ones looked at and not."""
+    filmed = performed(f"{name},fps=30,frames=120")
+    half_way = np.arange(len(filmed.keypoints)) % 3 == 1
+    known, sightings = BodyFitConfig(height_m=filmed.stature_m), exact(filmed, 3)
+    for title, usable in (("all looked at", None), ("a third held out", ~half_way)):
+        fitted = fit_body(sightings, filmed.masks, filmed.camera, filmed.fps, known, usable=usable)
+        vertices = fitted.meshes.vertices.astype(np.float64)
+        found = regress_keypoints(FittableBody.load().regressor[:17], vertices)
+        covered = overlap(silhouettes(vertices, fitted.meshes.faces, filmed.camera), filmed.masks)
+        for part, rows in (("others", ~half_way), ("half-way", half_way)):
+            named = f"{name}, 30 a second, {title}: {part}"
+            line = row(named, found[rows], filmed.keypoints[rows], covered[rows], ("", ""))
+            print(line, flush=True)
+
+
 def supplied(filmed: Filmed, vertices: Array, faces: NDArray[np.int32]) -> None:
     """The mesh that came with the recording, world metres, of the same topology."""
     found = regress_keypoints(FittableBody.load().regressor[:17], vertices)
@@ -100,21 +117,31 @@ def supplied(filmed: Filmed, vertices: Array, faces: NDArray[np.int32]) -> None:
     print(row("the mesh supplied", found, filmed.keypoints, overlaps, ("", "")), flush=True)
 
 
+def performed(name: str) -> Filmed:
+    """A made scene without pictures."""
+    return _filmed(name)[0]
+
+
 def made(name: str) -> tuple[Filmed, Sightings]:
     """A made scene, and what BlazePose sees of its pictures."""
+    filmed, performance, seed = _filmed(name)
+    room = render_background(filmed.camera, 1, seed)
+    pictures = (
+        FrameRenderer(performance.surface, vertices, "none").render(filmed.camera, room, 2).rgb
+        for vertices in performance.vertices
+    )
+    return filmed, blazepose(pictures, filmed.masks)
+
+
+def _filmed(name: str) -> tuple[Filmed, Performance, int]:
     configuration = named_scene(f"{name},width={SIZE},height={SIZE}")
     person = Person.load(configuration.shape)
     _, performance = perform(configuration, person)
     camera = camera_ring(configuration, performance.vertices)[0]
     masks = silhouettes(performance.vertices, performance.surface.faces, camera)
     stature = float(np.ptp(person.rest_vertices[np.unique(person.outer_faces)][:, 2]))
-    room = render_background(camera, 1, configuration.seed)
-    pictures = (
-        FrameRenderer(performance.surface, vertices, "none").render(camera, room, 2).rgb
-        for vertices in performance.vertices
-    )
     filmed = Filmed(name, camera, configuration.fps, masks, performance.keypoints3d, stature)
-    return filmed, blazepose(pictures, masks)
+    return filmed, performance, configuration.seed
 
 
 def blazepose(pictures: Iterator[NDArray[np.uint8]], masks: NDArray[np.bool_]) -> Sightings:
@@ -182,3 +209,5 @@ if __name__ == "__main__":
         fit_balance(Path(sys.argv[1]))
     for scene_name in SCENES:
         fit_made(scene_name)
+    for scene_name in ("walk", "dance"):
+        fit_held_out(scene_name)

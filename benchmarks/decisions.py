@@ -8,9 +8,9 @@ For each decision a scene where it leaves something out and one where it keeps i
 
 from __future__ import annotations
 
-import json
 import sys
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from benchmarks.altered_recordings import dim_lamp, misplace_bodies, show_again
 from benchmarks.scene_study import PreparedScene
-from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.presets import Configuration, fast
 from mocoflow_core.settings import with_settings
@@ -34,7 +34,14 @@ TURN = named_scene("turn")
 FAR_AWAY = TURN.model_copy(update={"name": "turn_48px", "width": 48, "height": 48})
 # Twelve moments, each four times: a recording at a quarter of the rate that its file has.
 STUTTER = TURN.model_copy(update={"name": "turn_stutter", "frames": 12})
-SHOWN = {STUTTER.name: 4}
+DIMMED = TURN.model_copy(update={"name": "turn_dimmed"})
+# Half a body's width beside its place and a step behind it.
+MISPLACED = TURN.model_copy(update={"name": "turn_misplaced"})
+ALTERED: dict[str, Callable[[Path], None]] = {
+    STUTTER.name: partial(show_again, times=4),
+    DIMMED.name: partial(dim_lamp, share=0.3),
+    MISPLACED.name: partial(misplace_bodies, offset_m=(0.2, 0.4, 0.0)),
+}
 # Another decision that would hide this one's effect.
 BESIDE = {
     "motion_fields": ("plan.repeated_frames=on",),
@@ -47,6 +54,9 @@ SCENES: dict[str, tuple[SyntheticConfig, SyntheticConfig]] = {
     "fine_detail": (FAR_AWAY, TURN),
     "repeated_frames": (STUTTER, TURN),
     "body_repair": (TURN, named_scene("turn_noise6")),
+    "location_search": (TURN, MISPLACED),
+    "appearance_codes": (TURN, DIMMED),
+    "fixed_light": (named_scene("still"), TURN),
     "background_extraction": (TURN, TURN),
     "mask_segmentation": (TURN, TURN),
 }
@@ -88,27 +98,12 @@ def _report(decision: str, scene: Scene, force: str) -> None:
 def _write(synthetic: SyntheticConfig, folder: Path) -> Scene:
     if not folder.exists():
         write_scene(synthetic, folder)
-        _show_again(folder, SHOWN.get(synthetic.name, 1))
+        ALTERED.get(synthetic.name, _as_recorded)(folder)
     return open_scene(folder)
 
 
-def _show_again(folder: Path, times: int) -> None:
-    """Each frame of the train camera ``times`` times in a row; the others keep one of them."""
-    description = json.loads((folder / "scene.json").read_text())
-    for files in (*folder.glob("frames/*"), *folder.glob("masks/*")):
-        copies = times if files.name == description["train_camera"] else 1
-        for file in sorted(files.iterdir(), reverse=True):
-            number, suffix = times * int(file.stem), file.suffix
-            picture = file.read_bytes()
-            file.unlink()
-            for copy in range(copies):
-                (files / f"{number + copy:06d}{suffix}").write_bytes(picture)
-    meshes = MeshSequence.load(folder / "meshes.npz")
-    again = np.arange(times * len(meshes.vertices), dtype=np.int32)
-    meshes = replace(meshes, frame_indices=again, vertices=meshes.vertices[again // times])
-    meshes.save(folder / "meshes.npz")
-    description.pop("truth", None)
-    (folder / "scene.json").write_text(json.dumps(description))
+def _as_recorded(folder: Path) -> None:
+    """Nothing is altered."""
 
 
 def _outcome(scene: Scene, configuration: Configuration) -> Outcome:

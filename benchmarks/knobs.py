@@ -61,6 +61,10 @@ def _rates(factor: float) -> Setting:
     return Setting("rates", f"x {factor:g}", changes)
 
 
+def _precision(name: str) -> Setting:
+    return Setting("precision", name, (f"schedule.precision={name}",))
+
+
 def _repair(share: float) -> Setting:
     """Rounds of bending the joints, of both kinds in proportion."""
     repair = fast().repair
@@ -103,6 +107,11 @@ KNOBS = (
         "inner depth",
         _length("inner depth", "sampling.inner_depth_m", 0.032, 0.04, 0.06),
         ("32 mm",),
+    ),
+    Knob(
+        "precision",
+        tuple(map(_precision, ("float32", "bfloat16"))),
+        ("bfloat16",),
     ),
     Knob("rates", tuple(map(_rates, (0.5, 1.0, 2.0, 4.0))), ("x 2",)),
     Knob(

@@ -1,8 +1,8 @@
 """One scene of a study: prepared once, trained many times, scored at views of other cameras.
 
 What the flow does between a scene folder and its scores, on the core's own functions and without
-a store. The scene's meshes must be located: no study searches for them. The training clock shows
-CPU seconds, also to a budget: what one idle core would take, whatever else the machine does.
+a store. The training clock shows CPU seconds, also to a budget: what one idle core would take,
+whatever else the machine does.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mocoflow_core.body.location import locate_body
+from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.capture.extract import ClipNeeds, extract_clip, extract_evaluation
 from mocoflow_core.capture.scene import Scene
@@ -50,6 +52,18 @@ class Trained(NamedTuple):
 
     result: OptimisationResult
     scores: dict[str, float]
+    renderer: TrainedRenderer
+
+
+class Start(NamedTuple):
+    """What the optimisation starts from, and the meshes as they came."""
+
+    clip: Clip
+    given: MeshSequence  # where they were placed, joints as they came
+    repaired: MeshSequence
+    plan: ScenePlan
+    density: CanonicalDensity
+    motion: MotionStart
 
 
 class PreparedScene:
@@ -58,8 +72,9 @@ class PreparedScene:
     def __init__(self, scene: Scene, configuration: Configuration) -> None:
         self.name = scene.description.name
         clock = TrainingClock(now=_cpu_now)
-        self.clip, self.plan, self.density, self.motion = _prepare(scene, configuration)
+        self.start = _prepare(scene, configuration)
         self.spent = clock.read()
+        self.clip, self.plan = self.start.clip, self.start.plan
         self._views = _views(scene, self.clip, configuration)
         self._evaluation: EvaluationConfig = configuration.evaluation
 
@@ -67,8 +82,8 @@ class PreparedScene:
         """Optimise as the plan says and score the result."""
         with TemporaryDirectory() as folder:
             result = self._optimise(configuration, seed, Path(folder))
-            trained = TrainedScene.open(Path(folder))
-        return Trained(result, self._scores(trained))
+            renderer = TrainedRenderer(TrainedScene.open(Path(folder)), self.clip)
+        return Trained(result, self._scores(renderer), renderer)
 
     def curve(self, configuration: Configuration, seed: int, method: str) -> list[CurveRow]:
         """Optimise as the plan says and score every snapshot, on the whole training clock."""
@@ -109,7 +124,7 @@ class PreparedScene:
             plan.needs("appearance_codes"),
         )
         problem = shell_problem(
-            self.density, self.motion, shape, learned, configuration.losses, seed
+            self.start.density, self.start.motion, shape, learned, configuration.losses, seed
         )
         return optimise_scene(
             self.clip,
@@ -122,8 +137,7 @@ class PreparedScene:
             clock=TrainingClock(now=_cpu_now),
         )
 
-    def _scores(self, trained: TrainedScene) -> dict[str, float]:
-        renderer = TrainedRenderer(trained, self.clip)
+    def _scores(self, renderer: TrainedRenderer) -> dict[str, float]:
         rows = score_views(Subject("", 0), "", self._views, renderer, self._evaluation)
         return {
             metric: float(np.mean([row.value for row in rows if row.metric == metric]))
@@ -136,9 +150,7 @@ def _cpu_now() -> Seconds:
     return Seconds(cpu_s, cpu_s)
 
 
-def _prepare(
-    scene: Scene, configuration: Configuration
-) -> tuple[Clip, ScenePlan, CanonicalDensity, MotionStart]:
+def _prepare(scene: Scene, configuration: Configuration) -> Start:
     choose = configuration.plan
     given = ingest_meshes(scene)
     preparation = decide_preparation(inspect_scene(scene, given), choose)
@@ -149,8 +161,11 @@ def _prepare(
         repeated_frames=choose.repeated_frames == "on",
     )
     clip = extract_clip(scene, configuration.capture, needs)
+    bodies = given.meshes
+    if needed["location_search"]:
+        bodies = locate_body(clip, given, configuration.location).meshes
     meshes, repair = repair_where_needed(
-        clip, given.meshes, configuration.repair, choose.body_repair, lambda share, text: None
+        clip, bodies, configuration.repair, choose.body_repair, lambda share, text: None
     )
     frames = decide_frames(0, len(clip.frames), choose)
     plan = plan_scene(clip, meshes, (*preparation, frames, repair), choose)
@@ -163,7 +178,7 @@ def _prepare(
         plan.needs("motion_fields"),
         configuration.motion,
     )
-    return clip, plan, density, motion
+    return Start(clip, bodies, meshes, plan, density, motion)
 
 
 def _views(scene: Scene, clip: Clip, configuration: Configuration) -> list[ScoredView]:

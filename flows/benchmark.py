@@ -8,9 +8,12 @@ from typing import Any
 from prefect import flow
 
 from flows.benchmark_request import BenchmarkRequest
-from flows.run_cell import run_cell
+from flows.parameters import Budget, Seeds, Setting
+from flows.results_folders import folder_of_this_run
+from flows.run_cells import run_cells
 from flows.run_facts import show_benchmark_in_prefect
 from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
+from mocoflow_core.presets import Preset
 from tasks.collect_cells import collect_cells
 from tasks.misplace_views import misplace_views
 from tasks.source import folder_source
@@ -22,27 +25,33 @@ COLLECTED = (*TABLES, "time_to_target.parquet", "misalignment.parquet")
 
 @flow(name="benchmark", validate_parameters=True)
 def benchmark(
-    out: Path,
+    out: Path | None = None,
     scenes: tuple[str, ...] | None = None,
     methods: tuple[str, ...] | None = None,
-    presets: tuple[str, ...] | None = None,
+    presets: tuple[Preset, ...] | None = None,
     experiment: str | None = None,
-    seeds: int = 3,
-    budget_s: float | None = None,
-    settings: tuple[str, ...] = (),
+    seeds: Seeds = 3,
+    budget_s: Budget | None = None,
+    settings: tuple[Setting, ...] = (),
     targets: tuple[str, ...] = (),
     store: str | None = None,
+    workers: int = 1,
+    dask: str | None = None,
+    slots: str | None = None,
 ) -> BenchmarkRecord:
     """Compare methods and presets on several scenes, each cell a flow run of its own.
 
-    Cells run one after the other. One that fails, that is cancelled on Prefect's pages, or whose
+    Cells run one after the other, in several processes or on a Dask cluster, with the same results.
+    One that fails, that is cancelled on Prefect's pages, or whose
     settings make no sense, is an omission of the comparison and stops no other; one that is
     finished in its folder is not run again.
 
     Args:
-        out: new or empty folder, or one of a benchmark with the same settings and budget.
-        scenes: folders, or synthetic scenes by name, with settings as in ``turn,seed=1``; with
-            ``@CAMERA`` behind it that camera is learned from.
+        out: new or empty folder, or one of a benchmark with the same settings and budget; by
+            default one named after the run.
+        scenes: folders, or synthetic scenes by name, with settings as in ``turn,seed=1``, or
+            ``aist``, ``zju-mocap``, ``people-snapshot``: all of the data set that lies on the
+            worker; with ``@CAMERA`` behind it that camera is learned from.
         methods: mocoflow, its ablations, steps of the paper's series, and posed_mesh, which is
             scored within their runs. By default mocoflow and posed_mesh.
         presets: complete configurations to start from, by default fast.
@@ -53,11 +62,16 @@ def benchmark(
         settings: single fields for all cells, such as ``schedule.fine_steps=200``.
         targets: scores to be reached, such as ``psnr_union=20``.
         store: folder or fsspec address of the artifact store.
+        workers: processes of this machine that run cells at once, each with its share of the cores.
+        dask: address of a Dask scheduler whose workers run the cells; they read and write the same
+            paths as this process.
+        slots: what each running cell holds one of: a resource of the Dask workers, else a global
+            concurrency limit of the Prefect server.
     """
     request = BenchmarkRequest(
         experiment=experiment,
         scenes=scenes,
-        out=out,
+        out=out or folder_of_this_run(),
         methods=methods,
         presets=presets,
         seeds=seeds,
@@ -65,12 +79,17 @@ def benchmark(
         settings=settings,
         targets=targets,
         store_url=store,
+        workers=workers,
+        dask=dask,
+        slots=slots,
     )
     folder, where = request.claim(), request.store
-    cells = tuple(run_cell(cell) for cell in request.cells())
+    cells = run_cells(request.cells(), request.runs_on)
 
     done = [cell for cell in cells if cell.state == "finished"]
-    files = folder_source(out, [f"{cell.folder}/{table}" for cell in done for table in TABLES])
+    files = folder_source(
+        folder.path, [f"{cell.folder}/{table}" for cell in done for table in TABLES]
+    )
     records = [cell.model_dump(mode="json") for cell in cells]
     tables = collect_cells(
         where, files, records, list(request.methods), request.waited_for, misplaced_rows(request)
@@ -86,7 +105,7 @@ def benchmark(
         folder.take(chart, chart.name)
     found = {name: tuple(values) for name, values in page.summary.items()}
     record = folder.finish({"cells": cells, **found})
-    show_benchmark_in_prefect(record, out / "benchmark.html", chart)
+    show_benchmark_in_prefect(record, folder.path / "benchmark.html", chart)
     return record
 
 

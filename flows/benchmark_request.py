@@ -10,16 +10,19 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from flows.allowed_folders import AllowedFolders
 from flows.benchmark_scenes import AskedScene, read_scenes
 from flows.request import Request
 from flows.users_store import open_users_store
+from flows.workers import Workers
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.store import Store
 from mocoflow_core.methods.ablations import SETTINGS, require_method
 from mocoflow_core.methods.benchmark_folder import BenchmarkFolder, BenchmarkRecord, CellRecord
 from mocoflow_core.methods.experiments import EXPERIMENTS, USUAL, Experiment
 from mocoflow_core.methods.scoring import METHODS
-from mocoflow_core.metrics.time_to_target import TargetConfig, read_target
+from mocoflow_core.metrics.person_judge import require_own_networks
+from mocoflow_core.metrics.time_to_target import TargetConfig, read_target, require_measured
 from mocoflow_core.presets import PRESETS
 from mocoflow_core.settings import with_settings
 
@@ -28,7 +31,10 @@ _FROM_EXPERIMENT = ("scenes", "methods", "presets")
 
 
 class Cell(NamedTuple):
-    """One run: where it is recorded, what the flow is asked for, and where its results go."""
+    """One run: where it is recorded, what the flow is asked for, and where its results go.
+
+    All paths are absolute: a cell may run in another process.
+    """
 
     record: CellRecord
     request: Request
@@ -53,6 +59,9 @@ class BenchmarkRequest(BaseModel):
     settings: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
     store_url: str | None = None
+    workers: int = 1
+    dask: str | None = None
+    slots: str | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -67,6 +76,10 @@ class BenchmarkRequest(BaseModel):
     def compares(self) -> Experiment:
         """The experiment, or the usual comparison."""
         return USUAL if self.experiment is None else EXPERIMENTS[self.experiment]
+
+    @property
+    def runs_on(self) -> Workers:
+        return Workers(count=self.workers, dask=self.dask, slots=self.slots)
 
     @cached_property
     def store(self) -> Store:
@@ -97,7 +110,8 @@ class BenchmarkRequest(BaseModel):
             words += ["--set", setting]
         if self.targets:
             words += ["--targets", *self.targets]
-        return shlex.join([*words, *(["--store", self.store_url] if self.store_url else [])])
+        words += ["--store", self.store_url] if self.store_url else []
+        return shlex.join([*words, *self.runs_on.words])
 
     def claim(self) -> BenchmarkFolder:
         """Take the output folder. Raises InputError for anything that no cell could run with."""
@@ -108,7 +122,12 @@ class BenchmarkRequest(BaseModel):
             budget_s=self.budget_s,
             command=self.command,
         )
-        return BenchmarkFolder.claim(self.out, begun)
+        return BenchmarkFolder.claim(self.place, begun)
+
+    @cached_property
+    def place(self) -> Path:
+        """Where the results go. Raises InputError for a folder that may not be written."""
+        return AllowedFolders.of_environment().to_write(self.out, "out")
 
     def cells(self) -> Iterator[Cell]:
         """Every scene with every preset, method that runs, and seed; scenes made when needed."""
@@ -127,12 +146,13 @@ class BenchmarkRequest(BaseModel):
         self, scene: AskedScene, preset: str, changes: tuple[str, ...], seed: int
     ) -> Request:
         return Request(
-            scene_path=scene.folder(),
+            scene_path=scene.folder().resolve(),
             preset=preset,
             seed=seed,
             budget_s=self.budget_s,
             settings=(*self.settings, *scene.settings, *changes),
-            store_url=self.store_url,
+            import_settings=scene.import_settings,
+            store_url=self.store.url if self.store_url else None,
         )
 
     def _cell(self, scene: AskedScene, preset: str, method: str, seed: int) -> Cell:
@@ -149,7 +169,7 @@ class BenchmarkRequest(BaseModel):
             reason=str(refusal or ""),
         )
         request = self._request(scene, preset, SETTINGS[method], seed)
-        return Cell(record, request, self.out / folder)
+        return Cell(record, request, self.place.resolve() / folder)
 
     def _refusal(self, preset: str, method: str) -> InputError | None:
         """Why a method makes no sense with a preset and the settings, if it does not."""
@@ -177,11 +197,13 @@ class BenchmarkRequest(BaseModel):
                 "posed_mesh alone is scored within the runs of another method.",
             )
         for preset in self.presets:
-            with_settings(PRESETS[preset](), self.settings)
+            person = with_settings(PRESETS[preset](), self.settings).person_scores
+            require_own_networks(person)
+            require_measured(self.waited_for, person.on_curve and person.use != "off")
         refusals = [self._refusal(p, m) for p in self.presets for m in self._running()]
         if refusals and all(refusals):
             raise next(filter(None, refusals))
-        _ = self.waited_for
+        self.runs_on.check()
 
 
 def _all_known(option: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:

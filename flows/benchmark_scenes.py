@@ -1,12 +1,15 @@
-"""The scenes of a benchmark as people write them: folders or synthetic ones, from any camera."""
+"""The scenes of a benchmark as people write them: folders, synthetic ones, or whole data sets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from flows.allowed_folders import AllowedFolders
+from flows.data_set_scenes import is_data_set, recordings
 from flows.demo_scene import demo_scene
+from mocoflow_core.capture.names import is_one_line
 from mocoflow_core.errors import InputError
 from mocoflow_core.synthetic.catalogue import named_scene
 
@@ -15,8 +18,9 @@ class AskedScene(NamedTuple):
     """One scene of a benchmark."""
 
     name: str  # what the benchmark calls it
-    where: str  # a folder, or a synthetic scene's name with its settings
+    where: Path | str  # a folder, or a synthetic scene's name with its settings
     train_camera: str | None  # null: the scene's own
+    import_settings: tuple[str, ...] = ()  # of a data set's recording
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -25,19 +29,20 @@ class AskedScene(NamedTuple):
 
     def folder(self) -> Path:
         """Where it lies; a synthetic one is made when it is first asked for."""
-        return Path(self.where) if _is_folder(self.where) else demo_scene(self.where)
+        return self.where if isinstance(self.where, Path) else demo_scene(self.where)
 
 
 def read_scenes(words: Iterable[str]) -> tuple[AskedScene, ...]:
     """Scenes such as ``data/someone``, ``turn_noise6,seed=1`` and ``data/someone@cam02``.
 
     A folder is called by its last part, a synthetic scene as it is written, both with the camera.
+    A data set's name, such as ``aist``, stands for all recordings below its root, and
+    ``aist:NAME`` for one.
 
-    Raises InputError for a scene that is neither, and for two of one name.
+    Raises InputError for a scene that is none of these, and for two of one name.
     """
     scenes: dict[str, AskedScene] = {}
-    for word in words:
-        scene = _read(word)
+    for scene in (scene for word in words for scene in _read(word)):
         if scene.name in scenes:
             raise InputError(
                 "Scenes of a benchmark have different names", repr(scene.name), "Rename a folder."
@@ -46,19 +51,34 @@ def read_scenes(words: Iterable[str]) -> tuple[AskedScene, ...]:
     return tuple(scenes.values())
 
 
-def _read(word: str) -> AskedScene:
+def _read(word: str) -> Iterator[AskedScene]:
     where, at, camera = word.rpartition("@")
     if not at or Path(word).is_dir():
         where, camera = word, ""
+    behind = f"@{camera}" if camera else ""
     if _is_folder(where):
-        if not Path(where).is_dir():
+        folder = AllowedFolders.of_environment().to_read(Path(where), "scenes")
+        if not folder.is_dir():
             raise InputError(
                 "A scene is a folder or a synthetic one's name", repr(where), "Check the path."
             )
-        name = Path(where).resolve().name
+        name = _one_line(folder.resolve().name)
+        yield AskedScene(f"{name}{behind}", folder, camera or None)
+    elif is_data_set(where):
+        for name, folder, choices in recordings(where):
+            yield AskedScene(f"{_one_line(name)}{behind}", folder, camera or None, choices)
     else:
-        name = named_scene(where).name
-    return AskedScene(f"{name}@{camera}" if camera else name, where, camera or None)
+        yield AskedScene(f"{named_scene(where).name}{behind}", where, camera or None)
+
+
+def _one_line(name: str) -> str:
+    if not is_one_line(name):
+        raise InputError(
+            "A scene's folder has a name of one line without control characters",
+            repr(name),
+            "Rename the folder.",
+        )
+    return name
 
 
 def _is_folder(where: str) -> bool:

@@ -15,6 +15,7 @@ from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
 from flows.store_commands import store_app
 from flows.video_options import Clip, Focal, is_bare_video, video_settings
+from flows.worker_options import CellWorkers, DaskAddress, Slots
 from mocoflow_core.errors import InputError
 
 # Written out: presets and experiments themselves take torch, which takes a second.
@@ -32,6 +33,9 @@ PERSON_HELP = (
     "number, by default the only large one."
 )
 BODY_MODEL_HELP = "SMPL or SMPL-X model file, or a folder of them, where the meshes need one."
+# The bounds of flows/parameters.py.
+MONTH_S = 31 * 24 * 3600.0
+Seed = typer.Option(help="Of everything random.", min=0, max=2**32 - 1)
 PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(
@@ -41,7 +45,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-DEMO_SCENE = "turn"
 # A first look: scoring all views takes as long as the reconstruction.
 DEMO_SETTINGS = ["evaluation.frames_per_camera=6"]
 
@@ -65,9 +68,9 @@ def reconstruct(
     body_model: Annotated[Path | None, typer.Option(help=BODY_MODEL_HELP)] = None,
     focal: Annotated[float | None, Focal] = None,
     clip: Annotated[str | None, Clip] = None,
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    seed: Annotated[int, Seed] = 0,
     budget: Annotated[
-        float | None, typer.Option(help="Seconds of the training clock.", min=1.0)
+        float | None, typer.Option(help="Seconds of the training clock.", min=1.0, max=MONTH_S)
     ] = None,
     until: Annotated[
         str | None,
@@ -105,7 +108,9 @@ def reconstruct(
         machines=machines,
         rendezvous=rendezvous,
     )
-    if request.claim(out).is_finished():
+    folder = request.claim(out)
+    out = folder.path
+    if folder.is_finished():
         typer.echo(f"Already finished: {out / 'report.html'}")
         return
     set_environment()
@@ -202,9 +207,10 @@ def benchmark(
     presets: Annotated[
         list[str] | None, typer.Option(metavar="PRESET...", help=PRESET_HELP)
     ] = None,
-    seeds: Annotated[int, typer.Option(help="How many seeds, from 0.", min=1)] = 3,
+    seeds: Annotated[int, typer.Option(help="How many seeds, from 0.", min=1, max=100)] = 3,
     budget: Annotated[
-        float | None, typer.Option(help="Seconds of the training clock of each run.", min=1.0)
+        float | None,
+        typer.Option(help="Seconds of the training clock of each run.", min=1.0, max=MONTH_S),
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -215,6 +221,9 @@ def benchmark(
         typer.Option(metavar="METRIC=VALUE...", help="Scores to be reached, as psnr_union=20."),
     ] = None,
     store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+    workers: Annotated[int, CellWorkers] = 1,
+    dask: Annotated[str | None, DaskAddress] = None,
+    slots: Annotated[str | None, Slots] = None,
 ) -> None:
     """Compare methods and presets on several scenes: error against run time."""
     from flows.benchmark_request import BenchmarkRequest
@@ -230,6 +239,9 @@ def benchmark(
         settings=tuple(settings or ()),
         targets=tuple(targets or ()),
         store_url=store,
+        workers=workers,
+        dask=dask,
+        slots=slots,
     )
     request.claim()
     set_environment()
@@ -247,11 +259,14 @@ def benchmark(
             settings=request.settings,
             targets=request.targets,
             store=request.store_url,
+            workers=request.workers,
+            dask=request.dask,
+            slots=request.slots,
         )
     for cell in record.cells:
         if cell.state != "finished":
             typer.echo(f"{cell.name} {cell.state}: {cell.reason}", err=True)
-    typer.echo(f"Benchmark: {request.out / 'benchmark.html'}")
+    typer.echo(f"Benchmark: {request.place / 'benchmark.html'}")
     if record.cells and not any(cell.state == "finished" for cell in record.cells):
         sys.exit(1)
 
@@ -308,9 +323,9 @@ def stability(
 @app.command()
 def demo(
     out: Annotated[Path, typer.Option(help="New folder for the results.")] = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    seed: Annotated[int, Seed] = 0,
 ) -> None:
     """Reconstruct a synthetic scene, made at first use."""
-    from flows.demo_scene import demo_scene
+    from flows.demo_scene import DEMO_SCENE, demo_scene
 
     reconstruct(scene=demo_scene(DEMO_SCENE), out=out, seed=seed, settings=DEMO_SETTINGS)

@@ -9,10 +9,13 @@ from tempfile import mkdtemp
 from flows.user_folders import cache_folder
 from mocoflow_core.io.content_key import digest_document
 from mocoflow_core.io.full_disk import full_disk_is_bad_input
-from mocoflow_core.synthetic.catalogue import named_scene
+from mocoflow_core.synthetic.catalogue import SCENES, named_scene
 from mocoflow_core.synthetic.configuration import SyntheticConfig
 from mocoflow_core.synthetic.scene_writer import write_scene
 from tasks.terminal_bar import terminal_bar
+
+# What is reconstructed where no scene is named.
+DEMO_SCENE = "turn"
 
 
 def demo_scene(name: str) -> Path:
@@ -27,6 +30,12 @@ def demo_scene(name: str) -> Path:
         with full_disk_is_bad_input(f"The folder {folder.parent}"):
             _make(configuration, folder)
     return folder
+
+
+def named_demo(path: Path) -> Path | None:
+    """The folder of the synthetic scene that a path of one word names, if it names one."""
+    is_name = len(path.parts) == 1 and path.name.partition(",")[0] in SCENES
+    return demo_scene(path.name) if is_name else None
 
 
 def _make(configuration: SyntheticConfig, folder: Path) -> None:

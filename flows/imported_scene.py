@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from flows.allowed_folders import AllowedFolders
 from flows.user_folders import body_models_folder, cache_folder
 from flows.video_options import is_bare_video
 from mocoflow_core.errors import InputError
@@ -20,12 +21,16 @@ if TYPE_CHECKING:
     from mocoflow_core.video.configuration import VideoConfig
 
 
+_LEAVE = "Leave it out."
+
+
 @lru_cache(maxsize=64)
 def scene_folder(
     path: Path,
     without_bodies: bool,
     body_model: Path | None = None,
     video: VideoConfig | None = None,
+    import_settings: tuple[str, ...] = (),
 ) -> Path:
     """The path itself, or the scene folder of the data set or the video that lies there.
 
@@ -33,21 +38,27 @@ def scene_folder(
         without_bodies: those of the data set are not needed.
         body_model: file or folder; by default the user's folder of them.
         video: what was said of a bare video; nothing may be said of anything else.
+        import_settings: single choices of the data set's import; for nothing else.
 
-    A data set is read by its defaults and imported once for the same files (their names, sizes
-    and times), the same configuration and version. Raises InputError as the import does.
+    A data set is read by its defaults otherwise and imported once for the same files (their
+    names, sizes and times), the same configuration and version. Raises InputError as the import
+    does, and for files outside of the allowed folders.
     """
     filmed = is_bare_video(path)
     if video and not filmed:
-        raise InputError("a bare video, of which something is said", f"{path}", "Leave it out.")
+        raise InputError("a bare video, of which something is said", f"{path}", _LEAVE)
     if not filmed and (not path.is_dir() or (path / "scene.json").is_file()):
+        if import_settings:
+            raise InputError("a data set, of whose import something is said", f"{path}", _LEAVE)
         return path
     from mocoflow_core.datasets.detect import kind_of
     from mocoflow_core.datasets.import_cache import import_once, place_of_import
     from tasks.terminal_bar import terminal_bar
 
     kind = kind_of("auto", path)
-    configuration = _without_bodies(kind, video, without_bodies) or choices(kind, (), body_model)
+    said = video or (choices(kind, import_settings, body_model) if import_settings else None)
+    configuration = _without_bodies(kind, said, without_bodies) or choices(kind, (), body_model)
+    AllowedFolders.of_environment().check_files(configuration)
     folder = place_of_import(path, configuration, cache_folder() / "datasets")
     if folder.is_dir():
         typer.echo(f"{path} is {kind.name}, imported before: {folder}", err=True)

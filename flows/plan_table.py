@@ -14,6 +14,7 @@ from mocoflow_core.artifacts import PlanArtifact
 from mocoflow_core.planning.decision import Decision, Part
 from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.planning.scoring import decide_evaluation
+from mocoflow_core.report.markdown_text import plain
 
 _WORDS = {True: "needed", False: "left out"}
 
@@ -25,7 +26,7 @@ def show_plan(request: Request, made: PlanArtifact) -> ScenePlan:
     decisions = (*plan.decisions, decide_evaluation(request.scene))
     rows = [{"part": decision.part, **_row(decision)} for decision in decisions]
     name = request.scene.description.name
-    create_table_artifact(rows, key="plan", description=f"What {name} needs")
+    create_table_artifact(rows, key="plan", description=f"What {plain(name)} needs")
     return plan
 
 

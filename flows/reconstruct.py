@@ -7,10 +7,13 @@ from time import perf_counter
 
 from prefect import flow
 
+from flows.demo_scene import DEMO_SCENE
 from flows.optimisation import optimise
+from flows.parameters import Budget, Devices, Machines, Seed, Setting, Until
 from flows.plan_table import show_plan
 from flows.preparation import prepare
 from flows.request import Request
+from flows.results_folders import folder_of_this_run
 from flows.run_facts import describe_run, records, show_in_prefect
 from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunRecord
@@ -25,30 +28,33 @@ from tasks.write_report import write_report
 
 @flow(name="mocoflow", validate_parameters=True)
 def reconstruct(
-    scene: Path,
-    out: Path,
+    scene: Path = Path(DEMO_SCENE),
+    out: Path | None = None,
     preset: Preset = "fast",
     meshes: Path | None = None,
-    seed: int = 0,
-    budget_s: float | None = None,
-    until: str | None = None,
-    settings: tuple[str, ...] = (),
+    seed: Seed = 0,
+    budget_s: Budget | None = None,
+    until: Until | None = None,
+    settings: tuple[Setting, ...] = (),
+    import_settings: tuple[Setting, ...] = (),
     store: str | None = None,
-    devices: int | None = None,
-    machines: int = 1,
+    devices: Devices | None = None,
+    machines: Machines = 1,
     rendezvous: str | None = None,
 ) -> RunRecord:
     """Reconstruct the person of a scene folder and say how well it went.
 
     Args:
-        scene: folder with a scene.json.
-        out: new or empty folder, or one of the same request, for what the user keeps.
+        scene: folder with a scene.json or of a data set, video file, or a synthetic scene's name.
+        out: new or empty folder, or one of the same request, for what the user keeps; by default
+            one named after the run.
         preset: complete configuration to start from.
         meshes: body meshes to use instead of the scene's own: an estimator's file or folder.
         seed: of everything random.
         budget_s: seconds of the training clock.
         until: score at which the optimisation stops, such as ``train_psnr=30``.
         settings: single fields, such as ``schedule.fine_steps=200``.
+        import_settings: choices of a data set's import, such as ``sequence=NAME``.
         store: folder or fsspec address of the artifact store.
         devices: GPUs, or cores where there are none, that share the optimisation; by default all
             GPUs where there are several, else one process on the CPU.
@@ -64,14 +70,15 @@ def reconstruct(
         budget_s=budget_s,
         until=until,
         settings=settings,
+        import_settings=import_settings,
         store_url=store,
         devices=devices,
         machines=machines,
         rendezvous=rendezvous,
     )
-    folder = request.claim(out)
+    folder = request.claim(out or folder_of_this_run())
     where, chosen = request.store, request.configuration
-    where.serve(out)
+    where.serve(folder.path)
 
     prepared = prepare(request)
     show_plan(request, prepared.plan)
@@ -109,5 +116,5 @@ def reconstruct(
         folder.take(rendered / "mocoflow" / "opacity", "opacity")
     record = folder.finish({**facts, "stages": records((*stages, report))})
     where.served()
-    show_in_prefect(record, out / "report.html", where.folder(report) / "error_curve.png")
+    show_in_prefect(record, folder.path / "report.html", where.folder(report) / "error_curve.png")
     return record

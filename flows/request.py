@@ -7,6 +7,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.allowed_folders import AllowedFolders
+from flows.demo_scene import named_demo
 from flows.imported_scene import scene_folder
 from flows.stopping import read_target
 from flows.user_folders import body_models_folder
@@ -19,6 +21,7 @@ from mocoflow_core.estimators.model_choice import choose_model
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.run_folder import RunFolder, RunRecord
 from mocoflow_core.io.store import Store
+from mocoflow_core.metrics.person_judge import require_own_networks
 from mocoflow_core.presets import PRESETS, Configuration
 from mocoflow_core.settings import with_settings
 from mocoflow_core.training.devices import Devices, choose_devices
@@ -40,6 +43,7 @@ class Request(BaseModel):
     budget_s: float | None = None
     until: str | None = None
     settings: tuple[str, ...] = ()
+    import_settings: tuple[str, ...] = ()
     store_url: str | None = None
     devices: int | None = None
     machines: int = 1
@@ -50,9 +54,20 @@ class Request(BaseModel):
         chosen = self.configuration
         said = chosen.video if chosen.video != type(chosen.video)() else None
         folder = scene_folder(
-            self.scene_path, self.meshes is not None, chosen.meshes.body_model, said
+            *(self._given_scene, self.meshes is not None, chosen.meshes.body_model, said),
+            self.import_settings,
         )
         return open_scene(folder, chosen.capture.train_camera)
+
+    @cached_property
+    def _given_scene(self) -> Path:
+        """A folder or a file that may be read, or the folder of a synthetic scene by name."""
+        allowed = self._allowed.to_read(self.scene_path, "scene")
+        return allowed if allowed.exists() else named_demo(self.scene_path) or allowed
+
+    @property
+    def _allowed(self) -> AllowedFolders:
+        return AllowedFolders.of_environment()
 
     @cached_property
     def configuration(self) -> Configuration:
@@ -69,6 +84,7 @@ class Request(BaseModel):
         preset = PRESETS[self.preset]()
         chosen = with_settings(preset, (*self.settings, *budget, *until))
         require_sense(chosen, preset)
+        self._allowed.check_files(chosen)
         return chosen
 
     @cached_property
@@ -88,11 +104,10 @@ class Request(BaseModel):
     @cached_property
     def bodies(self) -> Source | None:
         """The body meshes' file or folder."""
-        if self.meshes and not self.meshes.exists():
-            raise InputError(
-                "--meshes must be a file or a folder", str(self.meshes), "Check the path."
-            )
-        return meshes_source(self.scene, self.meshes)
+        meshes = self._allowed.to_read(self.meshes, "meshes") if self.meshes else None
+        if meshes and not meshes.exists():
+            raise InputError("--meshes must be a file or a folder", str(meshes), "Check the path.")
+        return meshes_source(self.scene, meshes)
 
     @cached_property
     def body_model(self) -> Source | None:
@@ -114,10 +129,12 @@ class Request(BaseModel):
     def check(self) -> None:
         """Raise InputError for what settings and file names show to be wrong, before any work."""
         select_training_frames(self.scene, self.configuration.capture)
+        require_own_networks(self.configuration.person_scores)
         _ = self.bodies, self.body_model, self.faces, self.processes
 
     def claim(self, out: Path) -> RunFolder:
         """Take a folder for the results. Raises InputError when it holds anything else."""
+        place = self._allowed.to_write(out, "out")
         self.check()
         begun = RunRecord(
             request=self._key(),
@@ -131,7 +148,7 @@ class Request(BaseModel):
             attribution=self.scene.description.attribution,
             remarks=tuple(self.scene.description.remarks),
         )
-        return RunFolder.claim(out, begun)
+        return RunFolder.claim(place, begun)
 
     def _key(self) -> str:
         inputs = {

@@ -10,6 +10,7 @@ from prefect.exceptions import Abort
 
 from flows.benchmark_request import Cell
 from flows.reconstruct import reconstruct
+from flows.slots import held_slot
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.run_folder import RunRecord, read_run
 from mocoflow_core.methods.benchmark_folder import CellRecord
@@ -19,8 +20,12 @@ from tasks.terminal_bar import terminal_line
 CANCELLED = "cancelled on Prefect's pages; the same benchmark again goes on from there"
 
 
-def run_cell(cell: Cell) -> CellRecord:
-    """Run one cell as a flow run that carries its name, unless its folder is finished."""
+def run_cell(cell: Cell, slots: str | None = None) -> CellRecord:
+    """Run one cell as a flow run that carries its name, unless its folder is finished.
+
+    Args:
+        slots: a global concurrency limit that the run holds one slot of.
+    """
     record, request, out = cell
     if record.state == "refused":
         return record
@@ -29,16 +34,18 @@ def run_cell(cell: Cell) -> CellRecord:
         return record.finished_as(read_run(out), out)
     started = _Started(record.name)
     try:
-        state = reconstruct.with_options(flow_run_name=started.name)(
-            scene=request.scene_path,
-            out=out,
-            preset=request.preset,
-            seed=request.seed,
-            budget_s=request.budget_s,
-            settings=request.settings,
-            store=request.store_url,
-            return_state=True,
-        )
+        with held_slot(slots):
+            state = reconstruct.with_options(flow_run_name=started.name)(
+                scene=request.scene_path,
+                out=out,
+                preset=request.preset,
+                seed=request.seed,
+                budget_s=request.budget_s,
+                settings=request.settings,
+                import_settings=request.import_settings,
+                store=request.store_url,
+                return_state=True,
+            )
     except Abort:  # No stage begins in a run that is being cancelled.
         if started.run_id is None:
             raise
@@ -72,14 +79,15 @@ def _cancelled(record: CellRecord, run_id: UUID) -> CellRecord:
 
 
 def _reason(state: State[RunRecord], error: object) -> str:
+    if isinstance(error, BaseException):
+        return reason_of(error)
+    return " ".join((state.message or str(state.name)).split())
+
+
+def reason_of(error: BaseException) -> str:
     """Why it ended, on one line; bad input speaks for itself, other errors say what they are."""
-    if isinstance(error, InputError):
-        reason = str(error)
-    elif isinstance(error, BaseException):
-        reason = f"{type(error).__name__}: {error}"
-    else:
-        reason = state.message or str(state.name)
-    return " ".join(reason.split())
+    text = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+    return " ".join(text.split())
 
 
 def _is_finished(cell: Cell) -> bool:

@@ -18,6 +18,7 @@ from mocoflow_core.artifacts import (
 )
 from mocoflow_core.io.run_folder import RunRecord, StageRecord
 from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
+from mocoflow_core.report.markdown_text import code, plain, unlinked
 
 # What rendering the run again needs to know of its clip.
 CAPTURE = ("fps", "source_fps", "first_frame", "last_frame", "up")
@@ -68,29 +69,37 @@ def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
 
 
 def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
-    """On the run's page: the scores, the error curve, the stages and where the report lies."""
+    """On the run's page: the scores, the error curve, the stages and a link to the report."""
     rows = [
-        {"method": method, "camera": camera, **metrics}
+        {"method": method, "camera": unlinked(camera), **metrics}
         for method, cameras in record.scores.items()
         for camera, metrics in cameras.items()
     ]
-    create_table_artifact(rows, key="scores", description=f"Mean scores of {record.scene}")
-    lines = [f"# {record.scene}", "", f"`{report}`", "", *_embedded(picture)]
+    scene = plain(record.scene)
+    create_table_artifact(rows, key="scores", description=f"Mean scores of {scene}")
+    curve = "\n".join([f"# {scene}", "", *_embedded(picture)])
+    create_markdown_artifact(curve, key="error-curve", description="Error against run time")
+    link = f"[Report]({report.resolve().as_uri()}): {code(str(report))}"
+    lines = [f"# {scene}", "", link, ""]
     lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [
         f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'from the store' if s.cached else ''} |"
         for s in record.stages
     ]
-    create_markdown_artifact("\n".join(lines), key="report", description=f"Run on {record.scene}")
+    create_markdown_artifact(
+        "\n".join(lines), key="report", description=f"Run on {plain(record.scene)}"
+    )
 
 
 def show_benchmark_in_prefect(record: BenchmarkRecord, page: Path, chart: Path) -> None:
     """On the benchmark's page: the scores, the chart, what is missing and where the page lies."""
-    create_table_artifact(list(record.summary), key="benchmark-scores", description=record.command)
-    lines = ["# Error against run time", "", f"`{page}`", "", *_embedded(chart)]
-    lines += [f"`{record.command}`", "", "| omission | why |", "|-|-|"]
-    lines += [f"| {omission['what']} | {omission['why']} |" for omission in record.omissions]
-    create_markdown_artifact("\n".join(lines), key="benchmark", description=record.command)
+    asked = code(record.command)
+    rows = [{**row, "scene": unlinked(str(row["scene"]))} for row in record.summary]
+    create_table_artifact(rows, key="benchmark-scores", description=asked)
+    lines = ["# Error against run time", "", code(str(page)), "", *_embedded(chart)]
+    lines += [asked, "", "| omission | why |", "|-|-|"]
+    lines += [f"| {plain(str(o['what']))} | {plain(str(o['why']))} |" for o in record.omissions]
+    create_markdown_artifact("\n".join(lines), key="benchmark", description=asked)
 
 
 def _embedded(picture: Path) -> list[str]:

@@ -7,6 +7,8 @@ from pathlib import Path
 from prefect import flow
 from prefect.artifacts import create_table_artifact
 
+from flows.allowed_folders import AllowedFolders
+from flows.results_folders import folder_of_this_run
 from mocoflow_core.errors import InputError
 from mocoflow_core.stability.catalogue import cases_of, require_areas
 from mocoflow_core.stability.table import StabilityRow, Summary, summarise
@@ -21,11 +23,14 @@ class CasesFailed(RuntimeError):
 
 
 @flow(name="stability", validate_parameters=True)
-def stability(out: Path, areas: tuple[str, ...] = (), quick_only: bool = False) -> Summary:
+def stability(
+    out: Path | None = None, areas: tuple[str, ...] = (), quick_only: bool = False
+) -> Summary:
     """Measure the cases of some areas, or of all, and write what came out.
 
     Args:
-        out: new or empty folder, or one of an earlier stability run.
+        out: new or empty folder, or one of an earlier stability run; by default one named after
+            the run.
         areas: names of areas; none for all.
         quick_only: leave out the cases that train scenes.
 
@@ -34,6 +39,7 @@ def stability(out: Path, areas: tuple[str, ...] = (), quick_only: bool = False) 
         CasesFailed: after everything is written, where a case failed.
     """
     named = [area for area in require_areas(areas) if cases_of(area, quick_only)]
+    out = AllowedFolders.of_environment().to_write(out or folder_of_this_run(), "out")
     claim(out)
     rows = [row for area in named for row in check_stability(area, quick_only)]
     write_stability(rows, out)

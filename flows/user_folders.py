@@ -14,6 +14,19 @@ def cache_folder() -> Path:
 
 def body_models_folder() -> Path:
     """Where body models lie that no option names (``XDG_DATA_HOME``, else ``~/.local/share``)."""
+    return _data_folder() / "body_models"
+
+
+def results_folder() -> Path:
+    """Where runs leave their results when neither they nor the worker name a place."""
+    return _data_folder() / "results"
+
+
+def data_folder() -> Path:
+    """Where scenes of deployed runs lie when their worker is told no other place."""
+    return _data_folder() / "data"
+
+
+def _data_folder() -> Path:
     data = os.environ.get("XDG_DATA_HOME")
-    share = Path(data) if data else Path.home() / ".local" / "share"
-    return share / "mocoflow" / "body_models"
+    return (Path(data) if data else Path.home() / ".local" / "share") / "mocoflow"

@@ -102,6 +102,13 @@ def _contradictions(chosen: Configuration) -> Iterator[Contradiction]:
                 f"{steps[0]} of pretraining and {steps[1]} of fitting the motion",
                 "Raise schedule.pretrain_steps, fit_steps or scale; or plan.initialisation=off.",
             )
+    judges = [file.digest for file in chosen.person_scores.own_files]
+    if chosen.video.segmenter and chosen.video.segmenter.digest in judges:
+        yield Contradiction(
+            "person_scores needs another network than the one that the scene is made with",
+            f"video.segmenter={chosen.video.segmenter.path.name} for both",
+            "Leave one of them to the networks that come with the package.",
+        )
     if schedule.first_bands > schedule.last_bands:
         yield Contradiction(
             "schedule.first_bands must not exceed schedule.last_bands",

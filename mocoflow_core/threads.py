@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 
 import torch
@@ -24,6 +24,19 @@ def torch_threads(threads: int) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
+
+
+def share_of(cores: Collection[int], index: int, of: int) -> set[int]:
+    """The cores, or GPUs, of one of several processes that divide them among themselves.
+
+    Args:
+        cores: numbers of those that all of them may use.
+        index: of this process, from 0.
+        of: how many processes there are; where they are more than the cores, some share one.
+    """
+    ordered = sorted(cores)
+    start, end = index * len(ordered) // of, (index + 1) * len(ordered) // of
+    return set(ordered[start : max(end, start + 1)])
 
 
 def seconds_of(work: Callable[[], None]) -> float:

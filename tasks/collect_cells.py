@@ -8,6 +8,7 @@ from pydantic import JsonValue
 
 from mocoflow_core.artifacts import CellTablesArtifact
 from mocoflow_core.methods.benchmark_folder import finished_cells
+from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.metrics import curve, table
 from mocoflow_core.metrics.benchmark_tables import gather, write_runs
 from mocoflow_core.metrics.misalignment import MisalignmentRow, write_misalignment
@@ -15,7 +16,7 @@ from mocoflow_core.metrics.time_to_target import TargetConfig, times_to_targets,
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Misplaced views.
+ALGORITHM_VERSION = 3  # The photographs' own scores.
 
 
 @stage(CellTablesArtifact, ALGORITHM_VERSION)
@@ -33,7 +34,7 @@ def collect_cells(
     ``misalignment.parquet``. Seconds.
     """
     finished = finished_cells(cells, folder.path)
-    scores = gather(finished, methods, table.read_scores, "scores.parquet")
+    scores = gather(finished, [*methods, *PHOTOGRAPHS], table.read_scores, "scores.parquet")
     curves = gather(finished, methods, curve.read_curve, "error_curve.parquet")
     write_runs(scores, table.SCHEMA, work.folder / "scores.parquet")
     write_runs(curves, curve.SCHEMA, work.folder / "error_curve.parquet")

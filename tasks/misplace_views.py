@@ -11,7 +11,7 @@ from mocoflow_core.metrics.score import EvaluationConfig
 from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Plausibility, OKS and LPIPS.
+ALGORITHM_VERSION = 3  # Views without a pose are none of OKS.
 
 
 @stage(MisplacedViewsArtifact, ALGORITHM_VERSION)

@@ -19,7 +19,7 @@ from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.training.clock import Seconds
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # Plausibility, OKS and LPIPS.
+ALGORITHM_VERSION = 5  # The photographs as they are, and shifted.
 
 
 @stage(ScoresArtifact, ALGORITHM_VERSION)
@@ -38,7 +38,7 @@ def score_views(
 ) -> Summary:
     """Scores as in the paper's sec. 4, for the trained scene and for the posed mesh.
 
-    Plausibility and OKS also of the photographs: the most that either could reach.
+    Plausibility, OKS and LPIPS also of the photographs: the most that a render could reach.
 
     Output: ``scores.parquet``, ``error_curve.parquet``. Seconds to minutes: the curve renders a
     few views at each kept state.

@@ -18,7 +18,7 @@ from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.markdown_tables import write_markdown_tables
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 3  # Plausibility, OKS and LPIPS.
+ALGORITHM_VERSION = 4  # The photographs' own scores.
 
 
 @stage(BenchmarkArtifact, ALGORITHM_VERSION)

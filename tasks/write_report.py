@@ -18,7 +18,7 @@ from mocoflow_core.report.inputs import ReportInputs
 from mocoflow_core.report.page import write_report as write
 from tasks.stage import Aside, Stage, Summary, stage
 
-ALGORITHM_VERSION = 6  # Key numbers fill their rows.
+ALGORITHM_VERSION = 7  # Photographs as they are, and shifted; networks along the curve.
 
 
 @stage(ReportArtifact, ALGORITHM_VERSION)

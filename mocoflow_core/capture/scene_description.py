@@ -8,6 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from mocoflow_core.capture.names import FolderName, OneLine
 from mocoflow_core.errors import InputError
 
 BehindPerson = Literal["kept", "plate", "white"]
@@ -60,7 +61,7 @@ class SceneDescription(_Part):
 
     format: Literal["mocoflow-scene"]
     version: Literal[1]
-    name: str
+    name: OneLine
     fps: float = Field(gt=0, allow_inf_nan=False)
     working_fps: float = Field(
         12.0, gt=0, allow_inf_nan=False, description="Rate to learn from; the paper's (sec. 4)."
@@ -73,7 +74,7 @@ class SceneDescription(_Part):
     )
     world: WorldDescription
     train_camera: str
-    cameras: dict[str, CameraDescription]
+    cameras: dict[FolderName, CameraDescription]
     behind_person: BehindPerson = Field(
         "kept", description="What capture.behind_person is where it says nothing."
     )

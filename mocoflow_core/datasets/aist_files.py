@@ -64,7 +64,7 @@ def find_files(
     Raises InputError when the sequence is not said by anything, and for missing folders.
     """
     folder = source.parent if source.is_file() else source
-    videos = videos or _with_videos(folder)
+    videos = videos or find_videos(folder)
     annotations = annotations or _with_annotations([folder, folder.parent, videos.parent])
     if sequence is None and source.is_file():
         sequence = source.name
@@ -100,7 +100,8 @@ def _with_annotations(near: list[Path]) -> Path:
     )
 
 
-def _with_videos(folder: Path) -> Path:
+def find_videos(folder: Path) -> Path:
+    """The folder of the videos, in or below one. Raises InputError where there is none."""
     if found := _videos_in(folder):
         return found
     raise InputError(
@@ -114,10 +115,15 @@ def _listed(folder: Path) -> Iterator[Path]:
     return folder.glob(f"g*{VIDEO_SUFFIX}") if folder.is_dir() else iter(())
 
 
+def sequences_in(videos: Path) -> list[str]:
+    """Names of the sequences of which a folder holds videos."""
+    return sorted({parse_name(path.name).sequence for path in _listed(videos)})
+
+
 def _name(sequence: str | None, videos: Path) -> AistName:
     if sequence is not None:
         return parse_name(sequence)
-    sequences = sorted({parse_name(path.name).sequence for path in _listed(videos)})
+    sequences = sequences_in(videos)
     if len(sequences) != 1:
         few = ", ".join(sequences[:3])
         raise InputError(

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from mocoflow_core.body.fit.fit_body import FittedBody, fit_body
 from mocoflow_core.body.fit.sightings import Sightings
+from mocoflow_core.capture.frame_selection import select_frames
 from mocoflow_core.capture.scene import UP_VECTORS
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetMeshes, DatasetScene, Up
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.video_facts import read_video_facts
 from mocoflow_core.perception.blazepose import BlazePose
+from mocoflow_core.perception.own_networks import own_segmenter
 from mocoflow_core.video.camera_check import require_movement, require_still_camera
 from mocoflow_core.video.clip_frames import ClipFrames, choose_frames
 from mocoflow_core.video.configuration import VideoConfig
@@ -51,16 +53,26 @@ def read_bare_video(
     """
     if not path.is_file():
         raise InputError("a video file", f"nothing at {path}", "Check the path.")
+    own = configuration.segmenter
+    segmenter = None if own is None else own_segmenter(own)
     facts = read_video_facts(path)
     frames, rate_said = choose_frames(path, facts, configuration)
-    person = follow_person(frames, frames.rate, configuration.person, BlazePose(), progress)
+    person = follow_person(
+        *(frames, frames.rate, configuration.start_s, configuration.person),
+        *(BlazePose(), progress),
+    )
     frames = frames.part(person.first, person.last)
-    plate, pictures, covered = make_plate(frames, person, frames.size, configuration.plate_frames)
+    working_fps = _working_fps(frames.rate, configuration.working_fps)
+    usable = usable_frames(frames, working_fps)
+    plate, pictures, covered = make_plate(
+        frames, person, usable, frames.size, configuration.plate_frames
+    )
     checked = np.unique(np.linspace(0, len(pictures) - 1, CHECKED_FRAMES).round().astype(int))
     require_movement(pictures[checked], covered[checked])
     _, motion_said = require_still_camera(pictures[checked], covered[checked])
     masks = mask_person(
-        frames, frames.rate, person, plate, configuration.least_difference, progress
+        *(frames, frames.rate, person, usable, plate, configuration.least_difference),
+        *(progress, segmenter),
     )
     camera, lens_said = camera_of_video(
         CAMERA, frames.video_size, frames.size, configuration.focal_px, facts.metadata
@@ -68,14 +80,16 @@ def read_bare_video(
     meshes = None
     fit_said: tuple[str, ...] = ("bodies are left out: give an estimate with --meshes",)
     if configuration.bodies == "fitted":
-        fitted = _fit(person, masks, camera, frames, configuration, progress)
+        fitted = _fit(person, masks, usable, camera, frames, configuration, progress)
         meshes = DatasetMeshes(fitted.meshes, "world", True, "fitted to landmarks and outlines")
         fit_said = _about(fitted)
     said = (
         rate_said,
+        *_held_back(usable),
         *person.remarks,
         *_cut_off(person, frames),
         motion_said,
+        *([f"masks by {segmenter.name} {segmenter.digest[:12]}"] if segmenter else []),
         lens_said,
         *fit_said,
     )
@@ -91,7 +105,23 @@ def read_bare_video(
         attribution=path.name,
         remarks=tuple(line for line in said if not line.startswith(CAUTION)),
         caveats=tuple(line for line in said if line.startswith(CAUTION)),
-        working_fps=_working_fps(frames.rate, configuration.working_fps),
+        working_fps=working_fps,
+    )
+
+
+def usable_frames(frames: ClipFrames, working_fps: float) -> NDArray[np.bool_]:
+    """Which frames (T,) no run at the working rate may hold out to score itself."""
+    indices = frames.indices
+    selection = select_frames(indices, frames.rate, working_fps, indices, len(indices), 0)
+    return ~np.isin(indices, selection.held_out)
+
+
+def _held_back(usable: NDArray[np.bool_]) -> tuple[str, ...]:
+    if usable.all():
+        return ()
+    return (
+        f"the background, the masks and the body are made from {usable.sum()} frames; "
+        f"{(~usable).sum()} between them may be held out for scoring, and their bodies are bridged",
     )
 
 
@@ -103,6 +133,7 @@ def _working_fps(rate: float, wanted: float) -> float:
 def _fit(
     person: FollowedPerson,
     masks: PackedMasks,
+    usable: NDArray[np.bool_],
     camera: Camera,
     frames: ClipFrames,
     configuration: VideoConfig,
@@ -123,6 +154,7 @@ def _fit(
         configuration.body,
         frames.indices,
         UP_VECTORS[UP],
+        usable,
         progress,
     )
 

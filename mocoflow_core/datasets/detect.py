@@ -40,7 +40,7 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
         raise InputError(
             "a folder of one data set", f"one of {names}", "Name the kind: mocoflow import KIND."
         )
-    if subjects := _subjects(folder, kinds):
+    if subjects := subjects_in(folder, kinds):
         more = ", ..." if len(subjects) > _NAMED_SUBJECTS else ""
         listed = ", ".join(subjects[:_NAMED_SUBJECTS]) + more
         raise InputError(
@@ -57,8 +57,8 @@ def detect_kind(folder: Path, kinds: Mapping[str, DatasetKind] = KINDS) -> Datas
     )
 
 
-def _subjects(folder: Path, kinds: Mapping[str, DatasetKind]) -> list[str]:
-    """Names of the folders inside that are data sets themselves."""
+def subjects_in(folder: Path, kinds: Mapping[str, DatasetKind]) -> list[str]:
+    """Names of the folders inside that are data sets of these kinds themselves."""
     return [
         inside.name
         for inside in sorted(folder.iterdir())

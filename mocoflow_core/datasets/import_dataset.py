@@ -16,7 +16,7 @@ from mocoflow_core.settings import with_settings
 
 Progress = Callable[[float, str], None]
 # Counts up when the same files give another scene folder.
-ALGORITHM_VERSION = 2  # Pictures as filmed; scene.json says what they are set before.
+ALGORITHM_VERSION = 3  # A video's frames that may be held out are not looked at.
 
 # Whatever values of another type, size or nesting than the data set's lead to.
 _OF_OTHER_CONTENT = (

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
 
 from mocoflow_core.io.pictures import as_bytes
 from mocoflow_core.methods.rendered_views import Renderer, ScoredView
@@ -19,8 +21,11 @@ from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.views import draw_views
 from mocoflow_core.perception.person import Picture
 
-# Rows of this method are the photographs' own scores: the most that a render could reach.
-PHOTOGRAPH = "photograph"
+# Rows of these methods are of the photographs: as they are, which no render can exceed, and moved
+# by half a pixel, which is how far the detectors agree with themselves.
+PHOTOGRAPH, SHIFTED_PHOTOGRAPH = "photograph", "shifted_photograph"
+PHOTOGRAPHS = (PHOTOGRAPH, SHIFTED_PHOTOGRAPH)
+LPIPS, PLAUSIBILITY, OKS = "lpips_alex", "plausibility", "oks"
 
 
 class Cut(NamedTuple):
@@ -32,8 +37,12 @@ class Cut(NamedTuple):
     area_px: float  # of the truth mask
 
     def render(self, renderer: Renderer) -> Picture:
-        """The same cut of a render."""
+        """What a method shows in place of the photograph."""
         rgb, _ = renderer.render(self.view.camera, self.view.frame_index)
+        return self.of(rgb)
+
+    def of(self, rgb: NDArray[np.floating]) -> Picture:
+        """The same cut of a render (H, W, 3) over white."""
         return as_bytes(self.crop.of(rgb, WHITE))  # type: ignore[arg-type]
 
 
@@ -71,15 +80,15 @@ def lpips_rows(
     lpips: LpipsAlex,
     side: int,
 ) -> list[ScoreRow]:
-    """``lpips_alex`` of every view and method, over the crop on white."""
+    """``lpips_alex`` of every view and method, over the crop on white; of a photograph it is 0."""
     protocol = f"crop {side} px on white; {lpips_protocol(lpips)}"
     rows = []
     for cut in cuts:
-        reference = lpips.features(cut.picture / np.float32(255.0))
-        for method, renderer in renderers.items():
-            ours = lpips.features(cut.render(renderer) / np.float32(255.0))
+        reference = _features(cut.picture, lpips)
+        seen = {method: _features(cut.render(r), lpips) for method, r in renderers.items()}
+        for method, ours in {**seen, PHOTOGRAPH: reference}.items():
             distance = lpips.distance(ours, reference)
-            rows.append(_row(subject, method, cut.view, "lpips_alex", distance, protocol))
+            rows.append(_row(subject, method, cut.view, LPIPS, distance, protocol))
     return rows
 
 
@@ -92,8 +101,9 @@ def person_rows(
 ) -> list[ScoreRow]:
     """``plausibility`` and ``oks`` of each method, and of the photographs themselves.
 
-    A photograph's OKS is that of a copy shifted by half a pixel: what the detectors alone are off
-    by. Views whose photograph has no pose have no OKS; the protocol counts them.
+    A photograph's own OKS is 1 wherever it has one: it is compared with itself. What the detectors
+    alone are off by shows in its copy that is shifted by half a pixel. Views whose photograph has
+    no pose have no OKS; the protocol counts them.
 
     Args:
         cuts: the views that the detectors look at.
@@ -101,12 +111,50 @@ def person_rows(
     """
     photographs = [cut.picture for cut in cuts]
     table = _Table(subject, cuts, judge, judge.look(photographs), of_views)
-    rows = table.plausibility(PHOTOGRAPH, table.references)
-    rows += table.oks(PHOTOGRAPH, judge.look_shifted(photographs))
-    for method, renderer in renderers.items():
-        sights = judge.look([cut.render(renderer) for cut in cuts])
-        rows += table.plausibility(method, sights) + table.oks(method, sights)
-    return rows
+    sights = {
+        PHOTOGRAPH: table.references,
+        SHIFTED_PHOTOGRAPH: judge.look_shifted(photographs),
+        **{name: judge.look([cut.render(r) for cut in cuts]) for name, r in renderers.items()},
+    }
+    return [
+        row
+        for method, seen in sights.items()
+        for row in (*table.plausibility(method, seen), *table.oks(method, seen))
+    ]
+
+
+class NetworkCurve:
+    """Means of the networks' scores over the same few views, again and again."""
+
+    def __init__(self, views: Sequence[ScoredView], side: int, networks: Networks) -> None:
+        """``side``: of the crop in pixels. The photographs are looked at once."""
+        self._judge, self._lpips = networks
+        self._cuts = [cut_of(view, side) for view in views]
+        pictures = [cut.picture for cut in self._cuts]
+        self._references = self._judge.look(pictures)
+        self._features = [_features(picture, self._lpips) for picture in pictures]
+
+    def means(self, renders: Sequence[NDArray[np.floating]]) -> dict[str, float]:
+        """By metric; ``oks`` is left out where no photograph has a pose.
+
+        Args:
+            renders: (H, W, 3) over white, one of each view.
+        """
+        pictures = [cut.of(rgb) for cut, rgb in zip(self._cuts, renders, strict=True)]
+        sights = self._judge.look(pictures)
+        distances = [
+            self._lpips.distance(_features(picture, self._lpips), reference)
+            for picture, reference in zip(pictures, self._features, strict=True)
+        ]
+        similarities = [
+            self._judge.similarity(sight, reference, cut.area_px)
+            for sight, reference, cut in zip(sights, self._references, self._cuts, strict=True)
+            if self._judge.has_reference(reference)
+        ]
+        found = {LPIPS: distances, PLAUSIBILITY: [float(sight.person) for sight in sights]}
+        if similarities:
+            found[OKS] = similarities
+        return {metric: float(np.mean(values)) for metric, values in found.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +170,7 @@ class _Table:
     def plausibility(self, method: str, sights: Sequence[Sight]) -> list[ScoreRow]:
         protocol = f"{self._pictures()}; {self.judge.plausibility_protocol()}"
         return [
-            _row(self.subject, method, cut.view, "plausibility", float(sight.person), protocol)
+            _row(self.subject, method, cut.view, PLAUSIBILITY, float(sight.person), protocol)
             for cut, sight in zip(self.cuts, sights, strict=True)
         ]
 
@@ -130,12 +178,11 @@ class _Table:
         known = [self.judge.has_reference(reference) for reference in self.references]
         protocol = (
             f"{self._pictures()}; {self.judge.oks_protocol()}; {known.count(False)} of "
-            f"{len(known)} views left out, no pose in the photograph; {PHOTOGRAPH}: a copy "
-            "shifted by half a pixel"
+            f"{len(known)} views left out, no pose in the photograph"
         )
         return [
             _row(
-                *(self.subject, method, cut.view, "oks"),
+                *(self.subject, method, cut.view, OKS),
                 self.judge.similarity(sight, reference, cut.area_px),
                 protocol,
             )
@@ -154,6 +201,10 @@ class _Table:
 def _drawn(cuts: Sequence[Cut], count: int, seed: int) -> list[Cut]:
     named = {(cut.view.camera.name, cut.view.frame_index): cut for cut in cuts}
     return [named[name] for name in draw_views(list(named), count, seed)]
+
+
+def _features(picture: Picture, lpips: LpipsAlex) -> list[Tensor]:
+    return lpips.features(picture / np.float32(255.0))
 
 
 def _row(

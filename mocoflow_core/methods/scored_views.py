@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from mocoflow_core.methods.rendered_views import Progress, Renderer, ScoredView
+from mocoflow_core.methods.rendered_views import Image, Progress, Renderer, ScoredView
 from mocoflow_core.metrics.crop import crop_around, crop_side
 from mocoflow_core.metrics.curve import CurveRow
 from mocoflow_core.metrics.score import EvaluationConfig, protocol, score_view
@@ -20,6 +20,13 @@ class Subject(NamedTuple):
 
     scene: str
     seed: int
+
+
+class NetworkMeans(Protocol):
+    """Scores of renders by networks."""
+
+    def means(self, renders: Sequence[Image]) -> dict[str, float]:
+        """Means by metric over renders (H, W, 3), one of each view."""
 
 
 class Moment(NamedTuple):
@@ -44,7 +51,8 @@ def score_views(
     side = side_of(views, configuration)
     rows = []
     for view in views:
-        scores = _score(view, renderer, side, configuration)
+        render = renderer.render(view.camera, view.frame_index)
+        scores = _score(view, render, side, configuration)
         rows += [
             ScoreRow(
                 subject.scene,
@@ -67,17 +75,27 @@ def error_curve(
     views: Sequence[ScoredView],
     configuration: EvaluationConfig,
     progress: Progress,
+    networks: NetworkMeans | None = None,
 ) -> list[CurveRow]:
-    """Mean scores over a small seeded draw of the views, at each kept moment."""
+    """Mean scores over a small seeded draw of the views, at each kept moment.
+
+    ``networks`` adds its own means of the same renders: those of ``few_views``.
+    """
     if not views:
         return []
     side = side_of(views, configuration)
     drawn = few_views(views, configuration)
     rows = []
     for number, moment in enumerate(moments):
-        scores = [_score(view, moment.renderer, side, configuration) for view in drawn]
-        for metric in scores[0]:
-            value = float(np.mean([score[metric] for score in scores]))
+        renders = [moment.renderer.render(view.camera, view.frame_index) for view in drawn]
+        scores = [
+            _score(view, render, side, configuration)
+            for view, render in zip(drawn, renders, strict=True)
+        ]
+        means = {name: float(np.mean([score[name] for score in scores])) for name in scores[0]}
+        if networks is not None:
+            means |= networks.means([rgb for rgb, _ in renders])
+        for metric, value in means.items():
             rows.append(
                 CurveRow(
                     subject.scene,
@@ -109,9 +127,9 @@ def side_of(views: Sequence[ScoredView], configuration: EvaluationConfig) -> int
 
 
 def _score(
-    view: ScoredView, renderer: Renderer, side: int, configuration: EvaluationConfig
+    view: ScoredView, render: tuple[Image, Image], side: int, configuration: EvaluationConfig
 ) -> dict[str, float]:
-    rgb, opacity = renderer.render(view.camera, view.frame_index)
+    rgb, opacity = render
     mask = np.asarray(view.clip.masks[view.row])
     photograph = np.asarray(view.clip.frames[view.row])
     return score_view(rgb, opacity, photograph, mask, crop_around(mask, side), configuration)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.methods.orbit_scores import Square, orbit_rows, rings_around
-from mocoflow_core.methods.person_scores import network_rows
+from mocoflow_core.methods.person_scores import NetworkCurve, network_rows
 from mocoflow_core.methods.posed_mesh import colour_mesh
 from mocoflow_core.methods.rendered_views import (
     Pictures,
@@ -20,7 +20,14 @@ from mocoflow_core.methods.rendered_views import (
     load_clips,
     scored_views,
 )
-from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, few_views, score_views
+from mocoflow_core.methods.scored_views import (
+    Moment,
+    Subject,
+    error_curve,
+    few_views,
+    score_views,
+    side_of,
+)
 from mocoflow_core.methods.surface_errors import surface_rows
 from mocoflow_core.methods.truth_errors import TruthConfig, motion_rows
 from mocoflow_core.metrics.crop import crop_side
@@ -103,7 +110,11 @@ def score_run(
     given = Pictures(folders.views / "posed_mesh")
     moments = [Moment("posed_mesh", "ingest_meshes", 0, before.wall, before.cpu, given)]
     moments += _kept_moments(folders.trained, renderer, clip, before)
-    curve = error_curve(subject, moments, views, evaluating, progress)
+    looking = None
+    if judging.person.on_curve and views and not isinstance(networks, str):
+        few, side = few_views(views, evaluating), side_of(views, evaluating)
+        looking = NetworkCurve(few, side, networks)
+    curve = error_curve(subject, moments, views, evaluating, progress, looking)
     curve += train_rows(subject, folders.trained, before)
     write_curve(curve, into / "error_curve.parquet")
     absent = (f"no plausibility, OKS and LPIPS: {missing}",) if missing else ()

@@ -37,8 +37,14 @@ CLOCKED_STAGES = (
     "optimise_scene",
 )
 
+# What networks say, measured along the curve where ``person_scores.on_curve`` is set.
+NETWORK_METRICS = ("lpips_alex", "plausibility", "oks")
+
 # What is measured along the curve; distances to the truth are taken at the end alone.
-CURVE_METRICS = ("psnr_union", "psnr", "psnr_image", "ssim", "mask_iou", "train_psnr")
+CURVE_METRICS = (
+    *("psnr_union", "psnr", "psnr_image", "ssim", "mask_iou", "train_psnr"),
+    *NETWORK_METRICS,
+)
 
 # Errors that are 1 - score; the others are errors already, or PSNR.
 SIMILARITIES = ("ssim", "mask_iou", "plausibility", "oks")
@@ -79,7 +85,7 @@ def read_curve(path: Path) -> list[CurveRow]:
 
 
 def as_error(metric: str, value: float) -> float:
-    """A score as an error that falls to 0: MSE for PSNR, 1 - score for similarities."""
+    """A score as an error that falls towards 0: MSE for PSNR, 1 - score for similarities."""
     if "psnr" in metric:
         return float(10.0 ** (-value / 10.0))
     return 1.0 - value if metric in SIMILARITIES else value

@@ -37,7 +37,7 @@ def misplaced_person_rows(
     """``lpips_alex``, ``plausibility`` and ``oks`` of views against themselves, misplaced.
 
     A shifted person is the same person to a detector: plausibility and OKS should not move where
-    PSNR and LPIPS do. A view whose photograph has no pose has no OKS.
+    PSNR and LPIPS do. A view whose photograph has no pose has no OKS, and is not among its views.
 
     Args:
         views: photographs (H, W, 3) with the person's mask (H, W), which has true pixels.
@@ -57,14 +57,17 @@ def misplaced_person_rows(
     for misplacement in MISPLACEMENTS:
         found = [_scores(view, misplacement, scale, side, networks) for view in views]
         for metric, reading in readings.items():
-            values = [value for scores in found for value in scores[metric]]
-            if values:
+            counted = [scores[metric] for scores in found if scores[metric]]
+            said = f"{len(views) - len(counted)} of {len(views)} views left out"
+            if counted:
                 rows.append(
                     MisalignmentRow(
                         *(scene, misplacement.kind, misplacement.amount, misplacement.unit),
                         misplacement.moved_px(scale),
-                        *(metric, float(np.mean(values)), len(views)),
-                        "; ".join([*notes, reading]),
+                        *(metric, float(np.mean(counted)), len(counted)),
+                        "; ".join(
+                            [*notes, reading, *([said] if len(counted) < len(views) else [])]
+                        ),
                     )
                 )
     return rows

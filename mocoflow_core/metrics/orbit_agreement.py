@@ -62,7 +62,8 @@ def _residual(cameras: Sequence[Camera], places: NDArray[np.floating]) -> float:
     world = triangulate(cameras, places)
     misses = []
     for camera, place in zip(cameras, places, strict=True):
-        depth = camera.to_camera(world[None])[0, 2]
+        # Lines that diverge meet behind a camera: they miss by as much there.
+        depth = abs(camera.to_camera(world[None])[0, 2])
         miss_px = np.linalg.norm(camera.project(world[None])[0] - place)
         misses.append(MM_PER_M * miss_px * depth / np.sqrt(camera.K[0, 0] * camera.K[1, 1]))
     return float(np.mean(misses))

@@ -44,9 +44,9 @@ class LpipsAlex:
     """
 
     def __init__(self, weights: Weights | None = None) -> None:
-        """``weights``: of the same layers from elsewhere, by ``read_weights``."""
+        """``weights``: of the same layers from elsewhere, by ``own_lpips_weights``."""
         chosen = weights or embedded_weights("lpips_alex")
-        self.name = "LPIPS-AlexNet-0.1"
+        self.name = "LPIPS-AlexNet-0.1" if weights is None else "LPIPS-AlexNet of the user's own"
         self.digest = chosen.digest
         self._tensors = {name: tensor.float() for name, tensor in chosen.tensors.items()}
 

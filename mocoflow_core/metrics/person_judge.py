@@ -11,11 +11,14 @@ from pydantic import Field
 
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
+from mocoflow_core.metrics.lpips_weights import own_lpips_weights
 from mocoflow_core.metrics.oks import centred_oks
 from mocoflow_core.metrics.perceptual import LpipsAlex
 from mocoflow_core.metrics.plausibility import person_box
 from mocoflow_core.perception.movenet import MoveNetThunder
 from mocoflow_core.perception.nanodet import NanoDet
+from mocoflow_core.perception.network_file import FileOfNetwork, NetworkFile
+from mocoflow_core.perception.own_networks import own_keypoint_detector, own_person_detector
 from mocoflow_core.perception.person import (
     KeypointDetector,
     Keypoints,
@@ -31,6 +34,19 @@ class PersonScoreConfig(ConfigurationPart):
         "auto",
         description="on: refused where a network's weights are missing; auto: then those scores "
         "are absent, with the reason beside the others; off: none of them.",
+    )
+    detector: NetworkFile | None = Field(
+        None,
+        description="A Mask R-CNN or Keypoint R-CNN that finds persons: .onnx, or weights of "
+        "torchvision; null: NanoDet.",
+    )
+    keypoints: NetworkFile | None = Field(
+        None, description="A Keypoint R-CNN that finds their keypoints; null: MoveNet."
+    )
+    lpips: NetworkFile | None = Field(
+        None,
+        description="An AlexNet for LPIPS: .safetensors with heads, or torchvision's weights, to "
+        "which the official heads are added; null: the one that comes with the package.",
     )
     views: int = Field(
         12, ge=1, description="Views that the detectors look at, drawn once by evaluation.seed."
@@ -50,10 +66,21 @@ class PersonScoreConfig(ConfigurationPart):
     keypoint_confidence: float = Field(
         0.3, gt=0.0, le=1.0, description="Points of the photograph that OKS compares."
     )
+    on_curve: bool = Field(
+        False,
+        description="They are measured along the error curve as well: some seconds more for each "
+        "of its points, which the training clock does not count.",
+    )
     orbit_moments: int = Field(
         3, ge=1, description="Moments shown from all around where no other camera exists."
     )
     orbit_views: int = Field(8, ge=3, description="Directions of each of these moments.")
+
+    @property
+    def own_files(self) -> list[FileOfNetwork]:
+        """The files of the user's own networks."""
+        named = (self.detector, self.keypoints, self.lpips)
+        return [file for file in named if file is not None]
 
 
 class Sight(NamedTuple):
@@ -72,10 +99,10 @@ class PersonJudge:
         detector: PersonDetector | None = None,
         keypoints: KeypointDetector | None = None,
     ) -> None:
-        """Without detectors: NanoDet and MoveNet Thunder."""
+        """Without detectors: those of the configuration."""
         self._configuration = configuration
-        self._detector = detector or NanoDet(least_confidence=min(0.2, configuration.confidence))
-        self._keypoints = keypoints or MoveNetThunder()
+        self._detector = detector or _person_detector(configuration)
+        self._keypoints = keypoints or _keypoint_detector(configuration)
 
     def look(self, pictures: Sequence[Picture]) -> list[Sight]:
         """One sight of each picture (H, W, 3), its most confident person."""
@@ -173,13 +200,40 @@ def open_networks(configuration: PersonScoreConfig) -> Networks | str:
     """The networks, or the reason why they are not there; no reason where nobody wants them.
 
     Raises:
-        InputError: weights are missing and the configuration asks for them.
+        InputError: weights are missing and the configuration asks for them, or a file that it names
+            is no such network.
     """
     if configuration.use == "off":
         return ""
+    if configuration.own_files:
+        return _networks(configuration)
     try:
-        return Networks(PersonJudge(configuration), LpipsAlex())
+        return _networks(configuration)
     except InputError as error:
         if configuration.use == "on":
             raise
         return str(error)
+
+
+def require_own_networks(configuration: PersonScoreConfig) -> None:
+    """Raise InputError where a file that the configuration names is no such network."""
+    if configuration.use != "off" and configuration.own_files:
+        _networks(configuration)
+
+
+def _networks(configuration: PersonScoreConfig) -> Networks:
+    own = configuration.lpips
+    weights = None if own is None else own_lpips_weights(own)
+    return Networks(PersonJudge(configuration), LpipsAlex(weights))
+
+
+def _person_detector(configuration: PersonScoreConfig) -> PersonDetector:
+    if configuration.detector is not None:
+        return own_person_detector(configuration.detector)
+    return NanoDet(least_confidence=min(0.2, configuration.confidence))
+
+
+def _keypoint_detector(configuration: PersonScoreConfig) -> KeypointDetector:
+    if configuration.keypoints is not None:
+        return own_keypoint_detector(configuration.keypoints)
+    return MoveNetThunder()

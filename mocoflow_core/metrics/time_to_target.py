@@ -14,7 +14,7 @@ from pyarrow import parquet
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 from mocoflow_core.metrics.benchmark_tables import Runs
-from mocoflow_core.metrics.curve import CURVE_METRICS, CurveRow, seconds_to_target
+from mocoflow_core.metrics.curve import CURVE_METRICS, NETWORK_METRICS, CurveRow, seconds_to_target
 
 SCHEMA = pa.schema(
     [
@@ -83,6 +83,17 @@ def read_target(text: str) -> Target:
             "A target is a metric and a finite number", repr(text), "Write psnr_union=20."
         )
     return Target(metric, value)
+
+
+def require_measured(waited_for: TargetConfig, networks_on_curve: bool) -> None:
+    """Raise InputError for a target that networks would have to measure and do not."""
+    for target in waited_for.targets:
+        if target.metric in NETWORK_METRICS and not networks_on_curve:
+            raise InputError(
+                f"person_scores.on_curve and networks that are on, to wait for {target.metric}",
+                "a curve without it",
+                "Add --set person_scores.on_curve=true --set person_scores.use=on.",
+            )
 
 
 def times_to_targets(runs: Runs[CurveRow], targets: Sequence[Target]) -> list[TimeToTarget]:

@@ -13,6 +13,7 @@ from scipy.special import expit
 from torch import Tensor
 
 from mocoflow_core.perception.embedded import embedded_weights, graph_network
+from mocoflow_core.perception.overlap import overlaps
 from mocoflow_core.perception.patch import batches
 from mocoflow_core.perception.person import Picture
 from mocoflow_core.perception.region import Region
@@ -112,9 +113,10 @@ def _merge(
     """
     chosen = np.flatnonzero(confidence >= LEAST_CONFIDENCE)
     chosen = chosen[np.argsort(-confidence[chosen], kind="stable")]
+    boxes = _corners(places[:, :2])
     merged = []
     while len(chosen):
-        same = _overlaps(places[chosen[0], :2], places[chosen, :2]) > SAME_PERSON_OVERLAP
+        same = overlaps(boxes[chosen[0]], boxes[chosen]) > SAME_PERSON_OVERLAP
         same[0] = True
         weights = confidence[chosen[same]]
         mean = np.average(places[chosen[same]], axis=0, weights=weights)
@@ -123,12 +125,10 @@ def _merge(
     return merged
 
 
-def _overlaps(box: NDArray[np.float32], boxes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Intersection over union of (2, 2) middle and size with (N, 2, 2) of them."""
-    low = np.maximum(box[0] - box[1] / 2, boxes[:, 0] - boxes[:, 1] / 2)
-    high = np.minimum(box[0] + box[1] / 2, boxes[:, 0] + boxes[:, 1] / 2)
-    shared = (high - low).clip(0).prod(-1)
-    return shared / (box[1].prod() + boxes[:, 1].prod(-1) - shared).clip(1e-12)
+def _corners(places: NDArray[np.float32]) -> NDArray[np.float32]:
+    """x0 y0 x1 y1 (N, 4) of boxes (N, 2, 2) given by middle and size."""
+    middles, sizes = places[:, 0], places[:, 1]
+    return np.concatenate((middles - sizes / 2, middles + sizes / 2), axis=1)
 
 
 def _in_picture(merged: tuple[NDArray[np.float32], float], region: Region) -> Detection:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.content_key import digest_file
+from mocoflow_core.perception.overlap import most_overlapping
 from mocoflow_core.perception.person import COCO17, Boxes, Keypoints, Picture
 
 ADVICE = "Give the alphapose-results.json of a COCO or Halpe model."
@@ -32,7 +33,7 @@ class AlphaPoseFile:
             try:
                 frame, person = _frame(str(entry["image_id"])), _keypoints(entry["keypoints"])
                 box = _box(entry, person)
-            except (KeyError, TypeError, ValueError) as error:
+            except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise InputError(
                     f"{path} as AlphaPose results", f"entry {number} ({error})", ADVICE
                 ) from error
@@ -86,9 +87,9 @@ class FileDetector:
 def _nearest(
     persons: Sequence[tuple[NDArray[np.float32], Keypoints]], box: NDArray[np.floating]
 ) -> Keypoints | None:
-    overlaps = [(_overlap(other, box), pose) for other, pose in persons]
-    best = max(overlaps, key=lambda found: found[0], default=(0.0, None))
-    return best[1] if best[0] > 0.0 else None
+    boxes = np.array([other for other, _ in persons], np.float32).reshape(-1, 4)
+    row = most_overlapping(box, boxes)
+    return None if row is None else persons[row][1]
 
 
 def _existing(path: Path) -> Path:
@@ -100,7 +101,7 @@ def _existing(path: Path) -> Path:
 def _entries(path: Path) -> list[Mapping[str, Any]]:
     try:
         content = json.loads(path.read_text())
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path} as JSON", str(error), ADVICE) from error
     if not isinstance(content, list):
         raise InputError(f"{path} as AlphaPose results, a list", type(content).__name__, ADVICE)
@@ -131,16 +132,10 @@ def _box(entry: Mapping[str, Any], person: Keypoints) -> NDArray[np.float32]:
     """The stored x, y, width, height as corners, or the box of the points."""
     if "box" in entry:
         x, y, width, height = (float(value) for value in entry["box"])
+        if not np.isfinite([x, y, width, height]).all():
+            raise ValueError("a box that is not finite")
         return np.array([x, y, x + width, y + height], np.float32)
     return np.concatenate([person.places.min(axis=0), person.places.max(axis=0)])
-
-
-def _overlap(box: NDArray[np.floating], other: NDArray[np.floating]) -> float:
-    """Intersection over union."""
-    inner = np.minimum(box[2:], other[2:]) - np.maximum(box[:2], other[:2])
-    common = float(np.prod(np.maximum(inner, 0.0)))
-    areas = [float(np.prod(one[2:] - one[:2])) for one in (box, other)]
-    return common / max(sum(areas) - common, 1e-12)
 
 
 def _mean(pose: Keypoints) -> float:

@@ -76,7 +76,9 @@ def _panel(axes: Axes, shown: Runs[CurveRow], runs: Runs[CurveRow]) -> None:
             axes.plot(band.seconds, band.median, style, color=colour, lw=1.8, zorder=3)
             if len(seeds) > 1:
                 axes.fill_between(band.seconds, band.low, band.high, color=colour, alpha=0.2, lw=0)
-    axes.set_title(next(iter(shown)).scene, loc="left", fontsize=10.5, pad=8)
+    # A name is one line and no formula, whatever is in it.
+    name = " ".join(next(iter(shown)).scene.split())
+    axes.set_title(name, loc="left", fontsize=10.5, pad=8, parse_math=False)
     axes.set_ylabel("mean squared error over the person")
     axes.set_xlabel("seconds of the training clock")
     axes.spines[["top", "right"]].set_visible(False)

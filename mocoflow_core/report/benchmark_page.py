@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from mocoflow_core.methods.ablations import change_of
 from mocoflow_core.methods.benchmark_folder import CellRecord
+from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.metrics.benchmark_tables import Contender, Runs
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import TimeToTarget
@@ -18,7 +19,13 @@ from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.curve_plot import svg_of
 from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.misalignment_table import misalignment_tables
-from mocoflow_core.report.summary_table import TableRow, by_scene, shown_metrics, summary_rows
+from mocoflow_core.report.summary_table import (
+    ABOUT_PHOTOGRAPHS,
+    TableRow,
+    by_scene,
+    shown_metrics,
+    summary_rows,
+)
 from mocoflow_core.report.template import render, seconds_text
 
 # Of a machine's description; the load differs from cell to cell.
@@ -41,7 +48,9 @@ def _context(results: BenchmarkResults, command: str) -> dict[str, Any]:
     return {
         "command": command,
         "experiment": results.experiment,
-        "facts": _facts(cells, finished, len(named)),
+        "facts": _facts(cells, finished, len([name for name in named if name not in PHOTOGRAPHS])),
+        "photographs": any(name in PHOTOGRAPHS for name in named),
+        "about_photographs": ABOUT_PHOTOGRAPHS,
         "finished": len(finished),
         "several_presets": len({cell.preset for cell in cells}) > 1,
         "chart": None if figure is None else Markup(svg_of(figure)),

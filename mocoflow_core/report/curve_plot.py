@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -15,11 +15,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from mocoflow_core.metrics.curve import CurveRow, StageSpan, as_error
+from mocoflow_core.metrics.curve import NETWORK_METRICS, CurveRow, StageSpan, as_error
 from mocoflow_core.report.metric_labels import label_of
 
 PANELS = ("psnr_union", "train_psnr", "mask_iou", "ssim", "keypoint_mm", "correspondence_mm")
-ERROR_NAMES = {"ssim": "1 - SSIM", "mask_iou": "1 - mask overlap"}
+ERROR_NAMES = {
+    "ssim": "1 - SSIM",
+    "mask_iou": "1 - mask overlap",
+    "plausibility": "1 - plausibility",
+    "oks": "1 - OKS",
+}
 INK, QUIET, ACCENT, WARM = "#3c3f44", "#8a8f98", "#0f766e", "#b45309"
 STAGE_COLOURS = ("#b9c9d8", "#e6d3b0", "#c6d9bf", "#e6c9c9", "#cdc6e2", "#bcdcd9", "#dfdfbd")
 # Text stays text, in the page's own font; ids do not depend on the moment.
@@ -46,7 +51,8 @@ def plot_curve(
 ) -> Figure | None:
     """One panel for each metric: log seconds against log error.
 
-    Several seeds are drawn as their median with the range between the best and the worst.
+    Several seeds are drawn as their median with the range between the best and the worst. What
+    networks say, where it was measured, has a line of panels of its own.
 
     Args:
         rows: of one method on one scene.
@@ -57,19 +63,22 @@ def plot_curve(
         None when the rows hold no metric that can be drawn.
     """
     rows = [row for row in rows if np.isfinite(row.value)]
-    panels = [metric for metric in PANELS if any(row.metric == metric for row in rows)][:columns]
-    panels = panels or sorted({row.metric for row in rows})[:columns]
-    if not panels:
+    lines = _panels({row.metric for row in rows}, columns)
+    if not lines:
         return None
+    width = max(map(len, lines))
     with mpl.rc_context(SVG_SETTINGS):
-        figure = Figure(figsize=(4.2 * len(panels), 3.7), layout="constrained")
+        figure = Figure(figsize=(4.2 * width, 3.7 * len(lines)), layout="constrained")
         figure.patch.set_alpha(0.0)
-        places = figure.subplots(1, len(panels), squeeze=False)[0]
-        for axes, metric in zip(places, panels, strict=True):
-            _panel(axes, [row for row in rows if row.metric == metric], metric)
-            _level(axes, metric, (baseline or {}).get(metric))
-            _shade(axes, spans, min(row.wall_s for row in rows), max(row.cpu_s for row in rows))
-            plain_ticks(axes)
+        places = figure.subplots(len(lines), width, squeeze=False)
+        for line, metrics in zip(places, lines, strict=True):
+            for axes, metric in zip(line, metrics, strict=False):
+                _panel(axes, [row for row in rows if row.metric == metric], metric)
+                _level(axes, metric, (baseline or {}).get(metric))
+                _shade(axes, spans, min(row.wall_s for row in rows), max(row.cpu_s for row in rows))
+                plain_ticks(axes)
+            for axes in line[len(metrics) :]:
+                axes.set_axis_off()
         figure.legend(
             handles=_legend(spans, bool(baseline)),
             loc="outside lower center",
@@ -78,6 +87,14 @@ def plot_curve(
             fontsize=8.5,
         )
     return figure
+
+
+def _panels(metrics: Collection[str], columns: int) -> list[list[str]]:
+    """The metrics of each line of panels."""
+    usual = [metric for metric in PANELS if metric in metrics][:columns]
+    networks = [metric for metric in NETWORK_METRICS if metric in metrics][:columns]
+    usual = usual or sorted(set(metrics) - set(networks))[:columns]
+    return [line for line in (usual, networks) if line]
 
 
 def svg_of(figure: Figure) -> str:

@@ -6,10 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from mocoflow_core.methods.ablations import change_of
+from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.report.benchmark_results import BenchmarkResults
+from mocoflow_core.report.markdown_text import code, plain
 from mocoflow_core.report.metric_labels import MetricLabel, label_of
 from mocoflow_core.report.misalignment_table import misalignment_tables
 from mocoflow_core.report.summary_table import (
+    ABOUT_PHOTOGRAPHS,
     SummaryCell,
     TableRow,
     by_scene,
@@ -32,7 +35,7 @@ def _head(results: BenchmarkResults, command: str) -> Iterator[str]:
     yield f"# {results.experiment.title}"
     if results.experiment.about:
         yield from ("", results.experiment.about)
-    yield from ("", f"`{command}`")
+    yield from ("", code(command))
 
 
 def _scores(results: BenchmarkResults) -> Iterator[str]:
@@ -41,12 +44,14 @@ def _scores(results: BenchmarkResults) -> Iterator[str]:
     several = len({contender.preset for contender in summaries}) > 1
     labels = [_titled(label_of(metric)) for metric in metrics]
     for rows in by_scene(summary_rows(summaries, metrics)):
-        yield from ("", f"## {rows[0].contender.scene}", "")
+        yield from ("", f"## {plain(rows[0].contender.scene)}", "")
         yield from _table(["method", "seeds", *labels], (_cells(row, several) for row in rows))
     changes = {c.method: change_of(c.method) for c in summaries if change_of(c.method)}
     if summaries:
         yield ""
         yield "Mean over seeds, in brackets the lowest and the highest. Best of a scene in bold."
+    if any(contender.method in PHOTOGRAPHS for contender in summaries):
+        yield from ("", ABOUT_PHOTOGRAPHS)
     if changes:
         yield ""
         yield from (f"- {_words(method)}: {change}" for method, change in changes.items())
@@ -66,18 +71,18 @@ def _text(cell: SummaryCell) -> str:
 
 def _misplaced(results: BenchmarkResults) -> Iterator[str]:
     for table in misalignment_tables(results.misplaced):
-        yield from ("", f"## {table.scene}, misplaced views", "")
+        yield from ("", f"## {plain(table.scene)}, misplaced views", "")
         heading = ["", *(_titled(label) for label in table.labels)]
         yield from _table(heading, ([row.name, *row.values] for row in table.rows))
     for protocol in sorted({row.protocol for row in results.misplaced}):
-        yield from ("", f"Protocol: {protocol}.")
+        yield from ("", f"Protocol: {plain(protocol)}.")
 
 
 def _missing(results: BenchmarkResults) -> Iterator[str]:
     found = results.omissions()
     if found:
         yield from ("", "## Omissions", "")
-        yield from (f"- {omission.what}: {omission.why}" for omission in found)
+        yield from (f"- {plain(omission.what)}: {plain(omission.why)}" for omission in found)
 
 
 def _table(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:

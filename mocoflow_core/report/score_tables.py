@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocoflow_core.methods.person_scores import PHOTOGRAPH
+from mocoflow_core.methods.person_scores import OKS, PHOTOGRAPH, PHOTOGRAPHS, SHIFTED_PHOTOGRAPH
 from mocoflow_core.metrics.bootstrap import mean_interval
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.report.inputs import BASELINE
@@ -113,6 +113,7 @@ def headlines(rows: Sequence[ScoreRow], method: str, train_camera: str) -> list[
     ours = key_numbers(rows, method, train_camera)
     theirs = key_numbers(rows, BASELINE, train_camera)
     most = key_numbers(rows, PHOTOGRAPH, train_camera)
+    moved = key_numbers(rows, SHIFTED_PHOTOGRAPH, train_camera)
     found = []
     for metric in HEADLINES:
         if metric not in ours:
@@ -121,7 +122,9 @@ def headlines(rows: Sequence[ScoreRow], method: str, train_camera: str) -> list[
         if metric in theirs:
             name = "before" if metric in BODY_METRICS else "posed mesh"
             notes.append(f"{name} {label.text(theirs[metric])}")
-        if metric in most:
+        if metric == OKS and metric in moved:
+            notes.append(f"shifted photographs {label.text(moved[metric])}")
+        elif metric in most:
             notes.append(f"photographs {label.text(most[metric])}")
         text = label.text(ours[metric])
         found.append(Headline(label.title, text, label.unit, ", ".join(notes)))
@@ -148,7 +151,7 @@ def _camera_rows(title: str, rows: list[ScoreRow], metrics: list[str]) -> list[C
     methods = list(dict.fromkeys(row.method for row in rows))
     values = {(m, metric): _values(rows, m, metric) for m in methods for metric in metrics}
     means = {key: float(np.mean(found)) if found else float("nan") for key, found in values.items()}
-    rivals = [method for method in methods if method != PHOTOGRAPH]
+    rivals = [method for method in methods if method not in PHOTOGRAPHS]
     table = []
     for method in methods:
         views = max(len(values[method, metric]) for metric in metrics)

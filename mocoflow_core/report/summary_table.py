@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.metrics.benchmark_tables import Contender
 from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.seed_summary import METRICS, Summaries
+
+ABOUT_PHOTOGRAPHS = (
+    "The photograph's row has the photographs in place of renders, which is the most that can be "
+    "reached (OKS 1 and LPIPS 0 by definition); the shifted photograph's are their copies half a "
+    "pixel off, which is how far the detectors agree with themselves."
+)
 
 
 class SummaryCell(NamedTuple):
@@ -32,10 +39,10 @@ def shown_metrics(summaries: Summaries) -> list[str]:
 
 
 def summary_rows(summaries: Summaries, metrics: Sequence[str]) -> list[TableRow]:
-    """Rows in the order of the benchmark; rivals are the contenders of the same scene."""
+    """Rows in the order of the benchmark; rivals are the methods of the same scene."""
     rows = []
     for contender, found in summaries.items():
-        rivals = [other for name, other in summaries.items() if name.scene == contender.scene]
+        rivals = [other for name, other in summaries.items() if _are_rivals(name, contender)]
         cells = []
         for metric in metrics:
             label, summary = label_of(metric), found.get(metric)
@@ -43,14 +50,20 @@ def summary_rows(summaries: Summaries, metrics: Sequence[str]) -> list[TableRow]
                 cells.append(SummaryCell("–", "", False))
                 continue
             means = [rival[metric].mean for rival in rivals if metric in rival]
-            best = max(means) if label.higher_is_better else min(means)
+            best = (max if label.higher_is_better else min)(means, default=None)
             low, high = label.text(summary.low), label.text(summary.high)
             spread = f"{low} to {high}" if low != high else ""
-            is_best = len(means) > 1 and summary.mean == best
+            is_best = (
+                contender.method not in PHOTOGRAPHS and len(means) > 1 and summary.mean == best
+            )
             cells.append(SummaryCell(label.text(summary.mean), spread, is_best))
         seeds = max((summary.seeds for summary in found.values()), default=0)
         rows.append(TableRow(contender, seeds, cells))
     return rows
+
+
+def _are_rivals(one: Contender, other: Contender) -> bool:
+    return one.scene == other.scene and one.method not in PHOTOGRAPHS
 
 
 def by_scene(rows: Sequence[TableRow]) -> list[list[TableRow]]:

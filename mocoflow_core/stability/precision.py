@@ -17,22 +17,11 @@ from mocoflow_core.stability.case import Case, Found
 from mocoflow_core.stability.toy_scene import Outcome, toy, train
 from mocoflow_core.training.batches import Batch, TrainingPixels
 from mocoflow_core.training.loop import TrainingRun
-from mocoflow_core.training.objective import ShellObjective
+from mocoflow_core.training.objective import Objective, ShellObjective
+from mocoflow_core.training.precision import ShortProducts
 
 KINDS = ("float32", "autocast bfloat16", "autocast float16")
 AUTOCAST = {"autocast bfloat16": torch.bfloat16, "autocast float16": torch.float16}
-
-
-class AutocastObjective(ShellObjective):
-    """The same losses with the networks' products in a shorter type."""
-
-    def __init__(self, own: ShellObjective, kind: str) -> None:
-        self.__dict__.update(own.__dict__)
-        self.kind = kind
-
-    def __call__(self, batch: Batch, generator: torch.Generator) -> dict[str, Tensor]:
-        with torch.autocast("cpu", AUTOCAST[self.kind]):
-            return super().__call__(batch, generator)
 
 
 class DoublePixels(TrainingPixels):
@@ -90,13 +79,17 @@ def _losses(run: TrainingRun) -> ShellObjective:
     return run.objective
 
 
+def _short(own: ShellObjective, kind: str) -> ShortProducts:
+    return ShortProducts(own, torch.device("cpu"), AUTOCAST[kind])
+
+
 @cache
 def _trained(kind: str) -> Outcome:
     def disturb(run: TrainingRun) -> None:
         if kind == "float64":
             _in_double(run)
         elif kind in AUTOCAST:
-            run.objective = AutocastObjective(_losses(run), kind)
+            run.objective = _short(_losses(run), kind)
 
     return train(toy(), disturb=disturb)
 
@@ -111,7 +104,8 @@ def _gradients(kind: str) -> dict[str, Tensor]:
     """Gradients of one and the same step at the start, in float64."""
     prepared = toy()
     field = prepared.field()
-    objective = prepared.objective(field)
+    own = prepared.objective(field)
+    objective: Objective = own
     # The heads that start at zero would hide what lies before them.
     with torch.no_grad():
         for name, weight in field.named_parameters():
@@ -121,10 +115,10 @@ def _gradients(kind: str) -> dict[str, Tensor]:
     field.anneal(2.0)
     batch = prepared.pixels().batch(256, 4, torch.Generator().manual_seed(0))
     if kind == "float64":
-        _to_double(field, objective)
+        _to_double(field, own)
         batch = _doubled_batch(batch)
     elif kind in AUTOCAST:
-        objective = AutocastObjective(objective, kind)
+        objective = _short(own, kind)
     terms = objective(batch, torch.Generator().manual_seed(0))
     torch.stack(list(terms.values())).sum().backward()
     return {n: p.grad.double() for n, p in field.named_parameters() if p.grad is not None}

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from mocoflow_core.capture.names import FolderName
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.synthetic.body_shape import BodyShape
 
@@ -16,7 +17,7 @@ MeshEstimate = Literal["exact", "other_topology", "joint_noise", "other_shape"]
 class RecordingConfig(ConfigurationPart):
     """How a performance is recorded. The same values give the same bytes."""
 
-    name: str = Field("turn", pattern=r"^[^/]+$", description="Name of the scene.")
+    name: FolderName = Field("turn", description="Name of the scene.")
     frames: int = Field(48, ge=1, description="Number of frames, spread over the whole motion.")
     fps: float = Field(12.0, gt=0, description="Frames per second that scene.json states.")
     width: int = Field(128, ge=8, description="Pixels of every camera.")
@@ -31,7 +32,7 @@ class RecordingConfig(ConfigurationPart):
         True,
         description="World coordinates, or the train camera's axes with the root at the origin.",
     )
-    seed: int = Field(0, ge=0, description="Of textures, joint noise and wrinkles.")
+    seed: int = Field(0, ge=0, description="Of textures, noise and wrinkles.")
 
 
 class SyntheticConfig(RecordingConfig):
@@ -48,6 +49,12 @@ class SyntheticConfig(RecordingConfig):
     )
     joint_noise_deg: float = Field(
         6.0, ge=0, lt=90, description="Root mean square angle of every joint's smooth error."
+    )
+    place_noise_m: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="Root mean square distance of the body's smooth error of place.",
     )
     shape: BodyShape = Field(BodyShape(height=0.4), description="The person filmed.")
     other_shape: BodyShape = Field(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
@@ -31,7 +32,7 @@ _NOISE_SECONDS = 0.5  # Standard deviation of the smoothing: errors last about a
 
 
 def estimate_meshes(configuration: SyntheticConfig, person: Person, motion: Motion) -> MeshSequence:
-    """The estimate in world metres; its root joint is where the person's is."""
+    """The estimate in world metres; its root joint errs by the noise of place alone."""
     if configuration.mesh_estimate == "exact":
         topology = body_topology(person)
         vertices = topology.vertices(person.pose(motion))
@@ -43,12 +44,20 @@ def estimate_meshes(configuration: SyntheticConfig, person: Person, motion: Moti
         if configuration.mesh_estimate == "other_shape":
             believed = Person.load(configuration.other_shape)
         vertices = topology.vertices(believed.pose(pose))
+    vertices = vertices + place_noise(len(motion), configuration)[:, None]
     return MeshSequence(
         np.arange(len(motion), dtype=np.int32),
         vertices.astype(np.float32),
         topology.faces,
         topology.keypoint_regressor,
     )
+
+
+def place_noise(count: int, configuration: SyntheticConfig) -> NDArray[np.float64]:
+    """Errors of place (T, 3) along a smooth random curve, metres."""
+    random = np.random.default_rng([configuration.seed, 78])
+    smoothing = _NOISE_SECONDS * configuration.fps
+    return _smooth_curve(random, count, configuration.place_noise_m, smoothing)
 
 
 def with_joint_noise(motion: Motion, configuration: SyntheticConfig) -> Motion:
@@ -70,6 +79,12 @@ def _smooth_rotations(
     random: np.random.Generator, count: int, rms_degrees: float, smoothing: float
 ) -> Rotation:
     """Rotations (T,) along a smooth random curve, their root mean square angle as given."""
+    return Rotation.from_rotvec(_smooth_curve(random, count, np.radians(rms_degrees), smoothing))
+
+
+def _smooth_curve(
+    random: np.random.Generator, count: int, rms: float, smoothing: float
+) -> NDArray[np.float64]:
+    """Vectors (T, 3) of a root mean square length."""
     curve = gaussian_filter1d(random.standard_normal((count, 3)), smoothing, axis=0, mode="reflect")
-    rms = np.sqrt((curve**2).sum(axis=1).mean())
-    return Rotation.from_rotvec(curve * np.radians(rms_degrees) / rms)
+    return curve * (rms / np.sqrt((curve**2).sum(axis=1).mean()))

@@ -54,3 +54,14 @@ def choose_devices(
             "--rendezvous must be HOST:PORT", repr(rendezvous), "Write the first machine's name."
         )
     return Devices(asked or max(gpus, 1), machines, rendezvous or "")
+
+
+def visible_gpus(named: str | None) -> tuple[str, ...]:
+    """The GPUs that this process may use, as ``CUDA_VISIBLE_DEVICES`` calls them.
+
+    Args:
+        named: that variable, where it is set.
+    """
+    count = torch.cuda.device_count()
+    names = named.split(",") if named else map(str, range(count))
+    return tuple(name.strip() for name in names)[:count]

@@ -29,6 +29,7 @@ from mocoflow_core.training.guard import Guard
 from mocoflow_core.training.objective import sum_of
 from mocoflow_core.training.optimiser import build_optimiser
 from mocoflow_core.training.pace import plan_pace, plan_rays
+from mocoflow_core.training.precision import in_precision
 from mocoflow_core.training.problem import Problem
 from mocoflow_core.training.ranks import Ranks
 from mocoflow_core.training.schedule import ScheduleConfig, band_alpha, rate_factor
@@ -69,8 +70,8 @@ class TrainingRun:
         clock: TrainingClock,
     ) -> None:
         self.field = field = problem.field
-        self.objective = problem.objective
         self.ranks = ranks = problem.ranks
+        self.objective = in_precision(problem.objective, schedule.precision, ranks.device)
         self.from_scratch = problem.from_scratch
         self.made_with = {**problem.settings, "schedule": schedule.deciding(), "seed": seed}
         self.pixels = pixels

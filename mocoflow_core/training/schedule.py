@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field, JsonValue
 
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.training.precision import Precision
 
 
 class ScheduleConfig(ConfigurationPart):
@@ -32,6 +33,10 @@ class ScheduleConfig(ConfigurationPart):
     # Up to 0.1 dB at unseen views for 1 % of a step: benchmarks/falling_curves.md.
     averaging: float = Field(
         0.97, ge=0, lt=1, description="of the weights' running mean, kept by a step; 0: no mean"
+    )
+    precision: Precision = Field(
+        "float32",
+        description="of the networks' products; bfloat16 is for GPUs that are made for it",
     )
     budget_s: float | None = Field(None, gt=0, description="seconds of the training clock in all")
     # On synthetic scenes twice the steps or twice the rays brought 0.06 dB and -0.2 dB at unseen

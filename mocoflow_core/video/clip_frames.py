@@ -105,7 +105,7 @@ def choose_frames(
     else:
         rate = min(1 / step, configuration.fps)
         wanted = np.arange(times[0], times[-1], 1 / rate)
-        nearest = np.abs(times[None] - wanted[:, None]).argmin(1)
+        nearest = _nearest(times, wanted)
         off_ms = 1000 * float(np.abs(times[nearest] - wanted).max())
         numbers, stride = rows[nearest], 0
         said = (
@@ -119,6 +119,12 @@ def choose_frames(
         path, indices.astype(np.int32), numbers.astype(np.int32), rate, configuration.max_side
     )
     return frames, said
+
+
+def _nearest(times: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.int64]:
+    """For each wanted time the row of the nearest of the ascending ones, the earlier of two."""
+    after = np.searchsorted(times, wanted).clip(1, len(times) - 1)
+    return after - (wanted - times[after - 1] <= times[after] - wanted)
 
 
 def _within(

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from mocoflow_core.body.fit.fit_body import BodyFitConfig
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.perception.network_file import NetworkFile
 
 
 class VideoConfig(ConfigurationPart):
@@ -29,6 +30,11 @@ class VideoConfig(ConfigurationPart):
         "fitted", description="None: meshes are given with --meshes later."
     )
     body: BodyFitConfig = BodyFitConfig()
+    segmenter: NetworkFile | None = Field(
+        None,
+        description="A Mask R-CNN that finds the person's pixels: .onnx, or weights of "
+        "torchvision; null: BlazePose.",
+    )
     least_difference: int = Field(
         30, ge=1, le=255, description="Difference to the plate that is no noise, 1/255."
     )

@@ -14,8 +14,7 @@ from mocoflow_core.perception.blazepose import PRESENT, BlazePose
 from mocoflow_core.perception.blazepose_detector import REGION_MARGIN, Detection
 from mocoflow_core.perception.blazepose_landmarks import Pose
 from mocoflow_core.perception.region import Region
-from mocoflow_core.video.clip_frames import OTHER_PART
-from mocoflow_core.video.tracks import Track, choose_track, find_tracks
+from mocoflow_core.video.tracks import Track, choose_track, find_tracks, nobody
 
 Progress = Callable[[float, str], None]
 BATCH = 8
@@ -40,9 +39,16 @@ class FollowedPerson:
 
 
 def follow_person(
-    frames: FrameSource, rate: float, person: int | None, model: BlazePose, progress: Progress
+    frames: FrameSource,
+    rate: float,
+    start_s: float,
+    person: int | None,
+    model: BlazePose,
+    progress: Progress,
 ) -> FollowedPerson:
     """Detect everybody, choose one, and find its pose in every frame in which it is there.
+
+    ``start_s`` is where the clip begins in its video.
 
     Raises InputError as ``choose_track`` does, and for somebody who leaves for half of the clip.
     """
@@ -59,7 +65,7 @@ def follow_person(
         progress(0.25 + 0.75 * len(poses) / count, "following the person")
     present = np.array([pose.presence >= PRESENT for pose in poses])
     first, last = longest_stay(present, round(LONGEST_GAP_S * rate))
-    remarks = (said, *_stay(present, first, last, rate))
+    remarks = (said, *_stay(present, first, last, rate, start_s))
     return FollowedPerson(poses[first : last + 1], present[first : last + 1], first, remarks)
 
 
@@ -84,17 +90,22 @@ def longest_stay(present: NDArray[np.bool_], longest_gap: int) -> tuple[int, int
     return int(longest[0]), int(longest[-1])
 
 
-def _stay(present: NDArray[np.bool_], first: int, last: int, rate: float) -> Iterator[str]:
+def _stay(
+    present: NDArray[np.bool_], first: int, last: int, rate: float, start_s: float
+) -> Iterator[str]:
     """What to say of frames without the person. Raises InputError where they are most."""
-    part = f"{first / rate:.1f} to {last / rate:.1f} s"
+    if last < first:
+        raise nobody()
+    start, end = start_s + first / rate, start_s + last / rate
+    part = f"{start:.1f} to {end:.1f} s of the video"
     if last - first + 1 < LEAST_PRESENCE * len(present):
         raise InputError(
             "a person who stays in the picture",
-            f"one who is there from {part} of {len(present) / rate:.1f} s of the clip",
-            f"Choose that part: {OTHER_PART}.",
+            f"one who is there from {part}, in {last - first + 1} of {len(present)} frames",
+            f"Choose that part: --clip {start:.1f}-{end:.1f}.",
         )
     if last - first + 1 < len(present):
-        yield f"caution: the person is in the picture from {part} of the clip, which is taken alone"
+        yield f"caution: the person is in the picture from {part}, which is taken alone"
     missed = int((~present[first : last + 1]).sum())
     if missed:
         yield f"caution: {missed} frames between others do not show the person clearly"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mocoflow_core.capture.background import background_plate
 from mocoflow_core.capture.frame_source import FrameSource, Image
 from mocoflow_core.perception.blazepose_landmarks import Pose
+from mocoflow_core.perception.person import PersonSegmenter
 from mocoflow_core.video.followed_person import FollowedPerson, Progress
 
 Mask = NDArray[np.bool_]  # (H, W)
@@ -60,12 +61,19 @@ def rough_masks(person: FollowedPerson, rows: NDArray[np.integer], size: tuple[i
 
 
 def make_plate(
-    frames: FrameSource, person: FollowedPerson, size: tuple[int, int], most: int
+    frames: FrameSource,
+    person: FollowedPerson,
+    usable: NDArray[np.bool_],
+    size: tuple[int, int],
+    most: int,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], Mask]:
-    """The background (H, W, 3), and the frames (N, H, W, 3) and masks that it is made of."""
-    count = len(person.poses)
-    rows = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-    rows = rows[person.seen[rows]]
+    """The background (H, W, 3), and the frames (N, H, W, 3) and masks that it is made of.
+
+    ``usable``: (T,) frames that may be looked at, the first among them.
+    """
+    shown = np.flatnonzero(usable & person.seen)
+    spread = np.linspace(0, len(shown) - 1, min(most, len(shown))).round().astype(int)
+    rows = shown[np.unique(spread)]
     pictures = np.stack([picture for _, picture in frames.read(frames.indices[rows].tolist())])
     masks = rough_masks(person, rows, size)
     return background_plate(pictures, masks, round(PLATE_MARGIN * max(size))), pictures, masks
@@ -75,15 +83,25 @@ def mask_person(
     frames: FrameSource,
     rate: float,
     person: FollowedPerson,
+    usable: NDArray[np.bool_],
     plate: NDArray[np.uint8],
     least_difference: int,
     progress: Progress,
+    segmenter: PersonSegmenter | None = None,
 ) -> PackedMasks:
-    """A mask for every frame, from the network and the difference to the plate."""
+    """A mask for every frame, from the network and the difference to the plate.
+
+    Masks of ``usable`` frames (T,) come from such frames alone, those of held-out ones from all. A
+    ``segmenter`` takes the place of the network that found the pose, where it finds the person.
+    """
     shape = plate.shape[:2]
+    reach = int(rate * LONGEST_STEP_S)
     packed = []
     for row, (_, picture) in enumerate(frames.read(frames.indices.tolist())):
-        probability = _steady(person.poses, row, shape, rate)
+        around = [person.poses[near] for near in neighbours(row, usable, reach)]
+        probability = _steady(person.poses[row], around, shape)
+        if segmenter is not None:
+            probability = _segmented(segmenter, picture, person.poses[row], probability)
         if not person.seen[row]:
             probability = np.full_like(probability, 0.5) * (probability > 0)
         mask = refine(probability, picture, plate, least_difference)
@@ -104,15 +122,35 @@ def refine(
     return _without_holes(_without_pieces(mask))
 
 
-def _steady(poses: list[Pose], row: int, shape: tuple[int, ...], rate: float) -> Probability:
-    """The network's probability, the median over time where it is unsure."""
-    here = poses[row].mask(shape[0], shape[1])
-    if not 0 < row < len(poses) - 1 or rate * LONGEST_STEP_S < 1:
+def neighbours(row: int, usable: NDArray[np.bool_], reach: int) -> list[int]:
+    """The rows before and after one that may help it; none where one of them is out of reach."""
+    may_help = np.flatnonzero(usable) if usable[row] else np.arange(len(usable))
+    place = int(np.searchsorted(may_help, row))
+    if not 0 < place < len(may_help) - 1:
+        return []
+    found = [int(may_help[place - 1]), int(may_help[place + 1])]
+    return found if found[1] - row <= reach and row - found[0] <= reach else []
+
+
+def _steady(pose: Pose, around: list[Pose], shape: tuple[int, ...]) -> Probability:
+    """The network's probability, the median with its neighbours where it is unsure."""
+    here = pose.mask(shape[0], shape[1])
+    if not around:
         return here
     unsure = (here > SURELY_NOT) & (here < SURELY)
-    around = [poses[near].mask(shape[0], shape[1])[unsure] for near in (row - 1, row + 1)]
-    here[unsure] = np.median(np.stack([here[unsure], *around]), axis=0)
+    beside = [near.mask(shape[0], shape[1])[unsure] for near in around]
+    here[unsure] = np.median(np.stack([here[unsure], *beside]), axis=0)
     return here
+
+
+def _segmented(
+    segmenter: PersonSegmenter, picture: Image, pose: Pose, otherwise: Probability
+) -> Probability:
+    """What a segmenter says of the person of a pose; where it sees nobody, what was said before."""
+    places = pose.keypoints.places
+    box = np.concatenate((places.min(axis=0), places.max(axis=0)))
+    (found,) = segmenter.masks([picture], [box])
+    return found if found.any() else otherwise
 
 
 def _without_pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.perception.blazepose_detector import Detection
+from mocoflow_core.perception.overlap import overlaps
 from mocoflow_core.perception.region import Region
 
 SAME_PERSON_OVERLAP = 0.3
@@ -50,9 +51,10 @@ def find_tracks(found: Sequence[Sequence[Detection]]) -> list[Track]:
     for row, detections in enumerate(found):
         free = list(tracks)
         for detection in detections:
-            overlaps = [overlap(track.last, detection.circle) for track in free]
-            if overlaps and max(overlaps) >= SAME_PERSON_OVERLAP:
-                track = free.pop(int(np.argmax(overlaps)))
+            lasts = np.array([track.last.corners for track in free]).reshape(-1, 4)
+            shares = overlaps(detection.circle.corners, lasts)
+            if len(free) and shares.max() >= SAME_PERSON_OVERLAP:
+                track = free.pop(int(shares.argmax()))
             else:
                 track = Track()
                 tracks.append(track)
@@ -68,11 +70,7 @@ def choose_track(tracks: Sequence[Track], frames: int, person: int | None) -> tu
     none is named.
     """
     if not tracks:
-        raise InputError(
-            "a person who can be seen",
-            "nobody in the video",
-            "Film the whole person, upright, from 2 to 5 metres.",
-        )
+        raise nobody()
     listed = "; ".join(
         f"--person {number}: {track.describe(frames)}" for number, track in enumerate(tracks)
     )
@@ -100,8 +98,9 @@ def choose_track(tracks: Sequence[Track], frames: int, person: int | None) -> tu
     return first, f"{len(tracks)} persons, the largest is followed; {listed}"
 
 
-def overlap(first: Region, second: Region) -> float:
-    """Intersection over union of the upright squares."""
-    a, b = first.corners, second.corners
-    shared = float(np.clip(np.minimum(a[2:], b[2:]) - np.maximum(a[:2], b[:2]), 0, None).prod())
-    return shared / (first.side**2 + second.side**2 - shared)
+def nobody() -> InputError:
+    return InputError(
+        "a person who can be seen",
+        "nobody in the video",
+        "Film the whole person, upright, from 2 to 5 metres.",
+    )

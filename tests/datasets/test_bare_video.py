@@ -12,8 +12,9 @@ from mocoflow_core.datasets.kinds import KINDS
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.video import write_video
 from mocoflow_core.video.configuration import VideoConfig
+from tests.lossless_video import write_lossless
 from tests.one_thread import one_thread  # noqa: F401
-from tests.squat_pictures import empty_room, squat_pictures
+from tests.squat_pictures import squat_pictures
 
 # A quarter of the video's size: enough for one who fills the picture.
 SIZE = (180, 320)
@@ -25,7 +26,6 @@ def small(picture):
 
 
 PERSON = [small(picture) for picture in squat_pictures()]
-ROOM = small(empty_room())
 MOVING = [PERSON[row] for row in (0, 1, 2, 1, 0, 1, 2, 1, 0, 1)]
 
 
@@ -69,24 +69,27 @@ def test_a_file_is_a_video_and_a_folder_is_none(tmp_path):
     assert "video lacks" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("pictures", "line"),
-    [
-        ([ROOM] * 10, "nobody in the video"),
-        ([np.hstack((p, p[:, ::-1])) for p in MOVING], "2 of a size. Choose one: --person 0: "),
-        (MOVING[:4] + [ROOM] * 9, "one who is there from 0.0 to 0.3 s of 1.3 s of the clip"),
-        (MOVING[:2], "at least 10 frames, got 2"),
-    ],
-    ids=["nobody", "two", "leaves", "two frames"],
-)
-def test_a_video_of_no_use_is_refused_in_one_line(tmp_path, pictures, line):
-    with pytest.raises(InputError) as refused:
-        read_bare_video(written(tmp_path / "film.mp4", pictures), QUICK)
-    assert line in str(refused.value)
-    assert "\n" not in str(refused.value)
-
-
 def test_a_text_is_no_video(tmp_path):
     (tmp_path / "film.mp4").write_text("no film")
     with pytest.raises(InputError, match="must be a video that can be decoded"):
         read_bare_video(tmp_path / "film.mp4", QUICK)
+
+
+def test_a_frame_that_may_be_held_out_reaches_nothing_that_is_learned_from(tmp_path, scene):
+    held_out = (1, 3, 5, 7)
+    other = [
+        np.maximum(picture, 120) if row in held_out else picture
+        for row, picture in enumerate(MOVING)
+    ]
+    made = []
+    for name, pictures in (("film", MOVING), ("other", other)):
+        film = tmp_path / f"{name}.mp4"
+        write_lossless(film, pictures, 10)
+        made.append(read_bare_video(film, QUICK).cameras["camera"])
+    one, two = made
+    np.testing.assert_array_equal(one.background, two.background)
+    masks = [dict(camera.masks.read(range(10))) for camera in made]
+    for row in set(range(10)) - set(held_out):
+        np.testing.assert_array_equal(masks[0][row], masks[1][row])
+    assert any((masks[0][row] != masks[1][row]).any() for row in held_out)
+    assert "made from 6 frames; 4 between them may be held out" in "".join(scene.remarks)

@@ -10,7 +10,8 @@ from tests.e2e.production import production
 
 @pytest.fixture(scope="session")
 def deployed(tmp_path_factory):
-    with production(tmp_path_factory.mktemp("production")) as made:
+    files = tmp_path_factory.getbasetemp()
+    with production(tmp_path_factory.mktemp("production"), files) as made:
         yield made
 
 

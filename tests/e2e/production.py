@@ -1,20 +1,24 @@
-"""A Prefect server, a work pool with all deployments and a worker, as separate processes."""
+"""Production as `make up` makes it: database, server, deployments, worker."""
 
 from __future__ import annotations
 
-import json
 import os
-import signal
-import socket
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.error import URLError
-from urllib.request import Request, urlopen
+
+from flows.production.api import ask, wait_for
+from flows.production.postgresql import find_programs
+from flows.production.processes import end_what_is_left
+from flows.production.site import Database, Site
+from mocoflow_core.errors import InputError
+from tests.free_port import free_port
 
 ROOT = Path(__file__).parents[2]
 PREFECT = [sys.executable, "-m", "prefect"]
@@ -28,6 +32,7 @@ class Production:
     url: str
     environment: dict[str, str]
     root: Path
+    site: Site | None = None
 
     def prefect(self, *words: str, wait_s: float = 120.0) -> str:
         """Run a command of Prefect's from the repository's root; give what it prints."""
@@ -44,10 +49,7 @@ class Production:
 
     def ask(self, path: str, body: dict | None = None):
         """One question to the API."""
-        content = None if body is None else json.dumps(body).encode()
-        question = Request(self.url + path, content, {"Content-Type": "application/json"})
-        with urlopen(question, timeout=30.0) as answer:
-            return json.loads(answer.read())
+        return ask(self.url, path, body)
 
     def start(self, deployment: str, **parameters: object) -> str:
         """Schedule a run; give its id."""
@@ -74,6 +76,9 @@ class Production:
             time.sleep(0.5)
         return now
 
+    def until(self, true: Callable[[], bool], within_s: float) -> None:
+        assert wait_for(true, within_s), f"not within {within_s:g} s"
+
     def runs(self) -> dict[str, dict]:
         """All runs by name."""
         return {run["name"]: run for run in self.ask("/flow_runs/filter", {"limit": 200})}
@@ -81,7 +86,12 @@ class Production:
     def artifacts(self, run: str) -> dict[str, str]:
         """What a run shows on its pages, by key."""
         wanted = {"flow_runs": {"id": {"any_": [run]}}, "limit": 200}
-        return {a["key"]: a["data"] for a in self.ask("/artifacts/filter", wanted)}
+        return {a["key"]: str(a["data"]) for a in self.ask("/artifacts/filter", wanted)}
+
+    def tasks(self, run: str) -> dict[str, str]:
+        """Names of the states in which a run's stages ended."""
+        wanted = {"flow_runs": {"id": {"any_": [run]}}, "limit": 200}
+        return {t["name"]: t["state_name"] for t in self.ask("/task_runs/filter", wanted)}
 
     def logs(self, run: str) -> str:
         wanted = {"logs": {"flow_run_id": {"any_": [run]}}, "limit": 200}
@@ -89,71 +99,56 @@ class Production:
 
 
 @contextmanager
-def production(root: Path) -> Iterator[Production]:
-    """Everything that a deployed run needs, for as long as the block lasts."""
-    port = _free_port()
-    url = f"http://127.0.0.1:{port}/api"
-    environment = {
-        **os.environ,
-        "PREFECT_HOME": str(root / "prefect"),
-        "PREFECT_API_URL": url,
-        "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
-        "PREFECT_SERVER_LOGGING_LEVEL": "CRITICAL",
+def production(root: Path, files: Path) -> Iterator[Production]:
+    """Everything that a deployed run needs, for as long as the block lasts.
+
+    Args:
+        files: where scenes and results may lie.
+    """
+    # PostgreSQL does not run as root, and others may not look into what the tests keep.
+    state = Path(tempfile.mkdtemp(prefix="mocoflow-e2e-"))
+    state.chmod(0o755)
+    site = Site(state, free_port(), database())
+    environment = site.environment() | {
+        "MOCOFLOW_DATA_ROOTS": str(files),
+        "MOCOFLOW_RESULTS_ROOT": str(files),
+        "PREFECT_SERVER_LOGGING_LEVEL": "WARNING",
         "PREFECT_LOGGING_LEVEL": "INFO",
         "PREFECT_LOGGING_TO_API_ENABLED": "true",
-        "PREFECT_FLOWS_HEARTBEAT_FREQUENCY": "30",
         "PREFECT_WORKER_QUERY_SECONDS": "2",
+        "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))),
         "XDG_CACHE_HOME": str(root / "cache"),
-        "DO_NOT_TRACK": "1",
-        "NO_COLOR": "1",
     }
-    made = Production(url, environment, root)
-    with _running(made, "server", "start", "--host", "127.0.0.1", "--port", str(port)):
-        _wait_for(url + "/health")
-        made.prefect("work-pool", "create", POOL, "--type", "process")
-        made.prefect("--no-prompt", "deploy", "--all", "--prefect-file", "deployments/prefect.yaml")
-        with _running(made, "worker", "start", "--pool", POOL, "--name", "here"):
-            yield made
-
-
-@contextmanager
-def _running(made: Production, *words: str) -> Iterator[None]:
-    # In a group of its own, so that nothing that it has started outlives it.
-    with (made.root / f"{words[0]}.log").open("wb") as log:
-        process = subprocess.Popen(
-            [*PREFECT, *words],
-            cwd=made.root,
-            env=made.environment,
-            stdout=log,
-            stderr=log,
-            process_group=0,
-        )
-        try:
-            yield
-        finally:
-            _end(process)
-
-
-def _end(process: subprocess.Popen) -> None:
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGTERM)
+    del environment["MOCOFLOW_SITE"]
+    made = Production(site.api, environment, root, site)
     try:
-        process.wait(20.0)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        print(site_command(made, site, "up"))
+        yield made
+    finally:
+        site_command(made, site, "down")
+        left = end_what_is_left(site)
+        shutil.rmtree(state)
+    assert left == []
 
 
-def _wait_for(url: str, within_s: float = 120.0) -> None:
-    end = time.monotonic() + within_s
-    while True:
-        with suppress(URLError, ConnectionError), urlopen(url, timeout=5.0):
-            return
-        assert time.monotonic() < end, f"nothing answers at {url}"
-        time.sleep(0.5)
+def site_command(made: Production, site: Site, command: str) -> str:
+    """What a command of production's own prints."""
+    words = [sys.executable, "-m", "flows.production", command, "--state", str(site.folder)]
+    if command == "up":
+        words += ["--port", str(site.port), "--database", str(site.database)]
+    done = subprocess.run(
+        words, cwd=ROOT, env=made.environment, capture_output=True, text=True, timeout=300.0
+    )
+    logs = "".join(log.read_text()[-3000:] for log in site.logs.glob("*.log"))
+    assert done.returncode == 0, done.stdout + done.stderr + logs
+    return done.stdout
 
 
-def _free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
+def database() -> Database:
+    """PostgreSQL where its programs are, as in production; else a file."""
+    try:
+        find_programs()
+    except InputError as error:
+        print(f"with SQLite: {error}")
+        return Database.SQLITE
+    return Database.POSTGRESQL

@@ -24,21 +24,6 @@ def working_on(folder: Path) -> list[str]:
     return found
 
 
-def test_a_deployed_run_completes_and_shows_what_it_found(deployed, scene, tmp_path):
-    out = tmp_path / "run"
-    deployed.prefect(
-        *("deployment", "run", "mocoflow/fast", "--watch"),
-        *("-p", f"scene={scene}", "-p", f"out={out}", "-p", "preset=toy"),
-        wait_s=240.0,
-    )
-    assert (out / "report.html").stat().st_size > 0
-    [run] = [r["id"] for r in deployed.runs().values() if r["parameters"].get("out") == str(out)]
-    assert deployed.state(run) == "COMPLETED"
-    shown = deployed.artifacts(run)
-    assert {"plan", "scores", "report"} <= shown.keys(), sorted(shown)
-    assert "optimise_scene took" in deployed.logs(run)
-
-
 def test_cancelling_a_run_on_two_devices_leaves_no_process(deployed, scene, tmp_path):
     store, out = tmp_path / "store", tmp_path / "run"
     run = deployed.start(

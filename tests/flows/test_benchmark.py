@@ -179,6 +179,10 @@ def test_a_cell_can_be_cancelled_alone_and_the_same_benchmark_goes_on_from_there
         ({"settings": ("schedule.ray=1",)}, "schedule.rays"),
         ({"targets": ("psnr",)}, "psnr_union=20"),
         ({"targets": ("foo=3",)}, "metric must be one of psnr_union"),
+        (
+            {"targets": ("oks=0.9",)},
+            "person_scores.on_curve and networks that are on, to wait for oks",
+        ),
     ],
 )
 def test_what_no_cell_could_run_with_is_refused_before_any(changes, because, tmp_path):

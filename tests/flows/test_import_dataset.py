@@ -124,3 +124,16 @@ def test_a_scene_is_what_it_is(toy_scene):
     assert scene_folder(toy_scene, without_bodies=False) == toy_scene
     file = toy_scene / "scene.json"
     assert scene_folder(file, without_bodies=False) == file
+
+
+def test_a_run_can_make_one_choice_of_its_data_sets_import(subject):
+    def rate(*settings):
+        return Request(scene_path=subject, import_settings=settings).scene.description.working_fps
+
+    assert rate("stride=3") == 8.0
+    assert rate() == 12.0
+
+
+def test_a_choice_of_an_import_is_refused_where_nothing_is_imported(toy_scene):
+    with pytest.raises(InputError, match="a data set, of whose import"):
+        _ = Request(scene_path=toy_scene, import_settings=("stride=3",)).scene

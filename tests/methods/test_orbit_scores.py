@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,3 +132,18 @@ def test_a_residual_is_the_millimetres_by_which_the_sights_miss(rings):
     ]
     assert np.allclose(residuals_mm(cameras, off, 0.3), 1000 * 3.0 / 200, rtol=0.15)
     assert np.isnan(residuals_mm(cameras, [*off[:2], None, None], 0.3)).all()
+
+
+def test_sights_that_meet_behind_the_cameras_miss_as_well(rings):
+    camera = rings[0].cameras[0]
+    beside = [
+        replace(camera, t=camera.t + np.array([shift, 0.0, 0.0])) for shift in (-0.1, 0.0, 0.1)
+    ]
+    apart = [(30.0, 40.0), (50.0, 43.0), (70.0, 40.0)]  # As if the point were behind them.
+    poses = [Keypoints(np.tile(place, (17, 1)), np.ones(17)) for place in reversed(apart)]
+    meeting = triangulate(beside, np.array(apart[::-1]))
+    behind = triangulate(beside, np.array(apart))
+    assert beside[1].to_camera(meeting[None])[0, 2] * beside[1].to_camera(behind[None])[0, 2] < 0
+    mirrored = [Keypoints(np.tile(place, (17, 1)), np.ones(17)) for place in apart]
+    for some in (poses, mirrored):
+        assert (residuals_mm(beside, some, 0.3) > 1.0).all()

@@ -7,11 +7,19 @@ import pytest
 
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.geometry.camera import Camera
-from mocoflow_core.methods.person_scores import PHOTOGRAPH, cut_of, lpips_rows, person_rows
+from mocoflow_core.methods.person_scores import (
+    PHOTOGRAPH,
+    SHIFTED_PHOTOGRAPH,
+    NetworkCurve,
+    cut_of,
+    lpips_rows,
+    person_rows,
+)
 from mocoflow_core.methods.rendered_views import ScoredView
-from mocoflow_core.methods.scored_views import Subject
+from mocoflow_core.methods.scored_views import Moment, Subject, error_curve, score_views, side_of
 from mocoflow_core.metrics.perceptual import LpipsAlex
-from mocoflow_core.metrics.person_judge import PersonJudge, PersonScoreConfig
+from mocoflow_core.metrics.person_judge import Networks, PersonJudge, PersonScoreConfig
+from mocoflow_core.metrics.score import EvaluationConfig
 from tests.dark_person import DarkPerson
 
 SIDE = 50
@@ -74,7 +82,9 @@ def test_a_shift_costs_no_oks_and_a_missing_person_all_of_it(rows):
 
 def test_the_photographs_are_scored_beside_the_methods(rows):
     assert values(rows, PHOTOGRAPH, "plausibility") == {4: 1.0, 9: 0.0}
-    assert values(rows, PHOTOGRAPH, "oks")[4] > 0.9
+    assert values(rows, PHOTOGRAPH, "oks") == {4: 1.0}
+    assert values(rows, SHIFTED_PHOTOGRAPH, "plausibility") == {4: 1.0, 9: 0.0}
+    assert 0.9 < values(rows, SHIFTED_PHOTOGRAPH, "oks")[4] < 1.0
 
 
 def test_pairs_left_out_and_views_drawn_are_counted_in_the_protocol(rows):
@@ -89,4 +99,30 @@ def test_lpips_of_the_photograph_itself_is_zero(seen):
     methods = {"same": Photograph(seen), "moved": Photograph(seen, 4)}
     rows = lpips_rows(SUBJECT, methods, cuts, LpipsAlex(), SIDE)
     assert values(rows, "same", "lpips_alex")[4] == 0.0
+    assert values(rows, PHOTOGRAPH, "lpips_alex")[4] == 0.0
     assert values(rows, "moved", "lpips_alex")[4] > 0.01
+
+
+def test_along_the_curve_networks_say_what_they_say_at_the_end(seen):
+    views, evaluating = [ScoredView(seen, row) for row in range(2)], EvaluationConfig()
+    side = side_of(views, evaluating)
+    networks = Networks(PersonJudge(PersonScoreConfig(), DarkPerson(), DarkPerson()), LpipsAlex())
+    moment = Moment("mocoflow", "optimise_scene", 7, 2.0, 1.0, Photograph(seen, 4))
+    looking = NetworkCurve(views, side, networks)
+    rows = error_curve(SUBJECT, [moment], views, evaluating, lambda *_: None, looking)
+    found = {row.metric: row.value for row in rows}
+    cuts, methods = [cut_of(view, side) for view in views], {"mocoflow": moment.renderer}
+    ended = [
+        *lpips_rows(SUBJECT, methods, cuts, networks.lpips, side),
+        *person_rows(SUBJECT, methods, cuts, networks.judge, 2),
+        *score_views(SUBJECT, "mocoflow", views, moment.renderer, evaluating),
+    ]
+    for metric in ("lpips_alex", "plausibility", "oks", "psnr", "mask_iou"):
+        at_the_end = list(values(ended, "mocoflow", metric).values())
+        assert found[metric] == pytest.approx(np.mean(at_the_end))
+    plain = error_curve(SUBJECT, [moment], views, evaluating, lambda *_: None)
+    assert {row.metric for row in rows} - {row.metric for row in plain} == {
+        "lpips_alex",
+        "plausibility",
+        "oks",
+    }

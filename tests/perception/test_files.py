@@ -55,9 +55,17 @@ def test_the_person_in_the_box_is_the_one(file):
         [entry("1.png", 0.0, points=18)],
         [entry("1.png", float("nan"))],
         [{"image_id": "1.png"}],
+        [entry("1.png", 10**400)],
+        [entry("1.png", 0.0, box=[0.0, 0.0, float("inf"), 1.0])],
     ],
 )
 def test_another_file_is_refused_in_one_line(tmp_path, content):
     with pytest.raises(InputError, match="AlphaPose") as refused:
         AlphaPoseFile(write(tmp_path / "file.json", content))
     assert "\n" not in str(refused.value)
+
+
+def test_a_text_that_is_nested_without_end_is_refused_in_one_line(tmp_path):
+    (tmp_path / "file.json").write_text("[" * 100_000)
+    with pytest.raises(InputError, match="as JSON"):
+        AlphaPoseFile(tmp_path / "file.json")

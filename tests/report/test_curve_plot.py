@@ -70,3 +70,15 @@ def test_the_picture_is_text_and_depends_on_nothing_but_its_data() -> None:
 def test_a_perfect_or_useless_score_does_not_break_the_log_axes(value: float) -> None:
     flat = [CurveRow("s", "m", 0, "st", 1, 1.0, 1.0, "ssim", value)]
     assert "<svg" in svg_of(plot_curve(flat, []))
+
+
+def test_what_networks_say_has_a_line_of_its_own() -> None:
+    networks = [
+        row._replace(metric=metric, value=0.5)
+        for row in rows(0)[::2]
+        for metric in ("lpips_alex", "oks")
+    ]
+    figure = plot_curve([*rows(0), *networks], SPANS)
+    titles = [axes.get_title(loc="left") for axes in figure.axes if axes.axison]
+    assert titles == ["PSNR, person", "LPIPS", "OKS"]
+    assert figure.get_size_inches()[1] == 2 * plot_curve(rows(0), SPANS).get_size_inches()[1]

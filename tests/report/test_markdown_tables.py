@@ -74,4 +74,21 @@ def test_misplaced_views_have_a_table_of_their_own(lines):
 
 
 def test_what_was_refused_is_said_with_its_reason(lines):
-    assert "- turn/paper/without_light, seed 0: refused: no | light" in lines
+    assert "- turn/paper/without_light, seed 0: refused: no \\| light" in lines
+
+
+def test_photographs_stand_in_the_table_and_compete_with_nobody(tmp_path):
+    values = {"mocoflow": 0.5, "posed_mesh": 0.25, "photograph": 0.75}
+    rows = {
+        Contender("turn", "fast", method): {
+            0: [ScoreRow("turn", method, 0, "cam01", 0, "plausibility", value, "white")]
+        }
+        for method, value in values.items()
+    }
+    known = {"scene": "turn", "preset": "fast", "folder": "", "train_camera": "cam00", "seed": 0}
+    cells = [CellRecord(**known, method="mocoflow", state="finished")]
+    write_markdown_tables(BenchmarkResults(cells, rows, {}, []), "", tmp_path / "table.md")
+    text = (tmp_path / "table.md").read_text()
+    assert "| mocoflow | 1 | **0.50** |" in text
+    assert "| photograph | 1 | 0.75 |" in text
+    assert "The photograph's row has the photographs in place of renders" in text

@@ -79,3 +79,18 @@ def test_without_other_cameras_the_held_out_frames_are_the_key_numbers() -> None
 @pytest.mark.parametrize("rows", [[], score("posed_mesh", "cam01", "psnr_union", 1.0)])
 def test_a_run_without_scores_of_its_own_has_no_key_numbers(rows: list[ScoreRow]) -> None:
     assert headlines(rows, "mocoflow", "cam00") == []
+
+
+def test_key_numbers_stand_beside_what_photographs_reach() -> None:
+    rows = [
+        *score("mocoflow", "cam01", "oks", 0.8),
+        *score("photograph", "cam01", "oks", 1.0),
+        *score("shifted_photograph", "cam01", "oks", 0.97),
+        *score("mocoflow", "cam01", "plausibility", 0.5),
+        *score("photograph", "cam01", "plausibility", 0.75),
+        *score("shifted_photograph", "cam01", "plausibility", 1.0),
+    ]
+    notes = {found.title: found.note for found in headlines(rows, "mocoflow", "cam00")}
+    assert notes == {"OKS": "shifted photographs 0.970", "plausibility": "photographs 0.75"}
+    (group,) = view_table(rows, "cam00").groups
+    assert not any(cell.best for row in group for cell in row.cells)

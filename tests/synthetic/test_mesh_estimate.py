@@ -78,6 +78,16 @@ def test_joint_noise_is_smooth_in_time(small_turn, person):
     assert steps.max() < 0.5 * configuration.joint_noise_deg
 
 
+def test_noise_of_place_moves_the_whole_body_by_the_promised_root_mean_square(
+    small_turn, person, performed
+):
+    noisy = small_turn.model_copy(update={"place_noise_m": 0.06})
+    moved = _estimate(noisy, person, performed, "other_topology").vertices
+    errors = moved - _estimate(small_turn, person, performed, "other_topology").vertices
+    assert np.ptp(errors, axis=1).max() < 1e-6  # float32 vertices a metre from the origin
+    assert np.sqrt((errors[:, 0] ** 2).sum(axis=1).mean()) == pytest.approx(0.06, rel=1e-4)
+
+
 def test_no_noise_leaves_the_motion_alone(small_turn, performed):
     noisy = with_joint_noise(performed[0], small_turn.model_copy(update={"joint_noise_deg": 0.0}))
     for joint, rotation in performed[0].joints.items():

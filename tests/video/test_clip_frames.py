@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from mocoflow_core.io.video import write_video
 from mocoflow_core.io.video_facts import VideoFacts, read_video_facts
 from mocoflow_core.video.clip_frames import choose_frames
 from mocoflow_core.video.configuration import VideoConfig
+from tests.phone_video import turned_clockwise
 
 PATH = Path("phone.mp4")
 
@@ -43,6 +43,15 @@ def test_a_varying_rate_becomes_even_times():
     taken = (times - times[0])[frames.numbers]
     assert np.abs(taken - frames.indices / frames.rate).max() <= 0.051
     assert "varies (10 to 30.3 per second)" in said
+
+
+def test_frames_of_a_varying_rate_are_the_nearest_ones():
+    times = np.cumsum(np.random.default_rng(0).choice([0.01, 0.03, 0.08], 300))
+    times -= times[0]
+    frames, _ = choose_frames(PATH, VideoFacts(times, {}), VideoConfig(fps=20))
+    wanted = np.arange(len(frames.numbers)) / frames.rate
+    off = np.abs(times[frames.numbers] - wanted)
+    assert off == pytest.approx(np.abs(times[None] - wanted[:, None]).min(1))
 
 
 def test_stamps_rounded_to_milliseconds_are_a_constant_rate():
@@ -95,16 +104,9 @@ def test_a_portrait_video_stands_upright(tmp_path):
         picture[:16, :16] = 255  # Top left as stored, top right as shown.
     path = tmp_path / "portrait.mp4"
     write_video(path, pictures, 10)
-    path.write_bytes(_turned_clockwise(path.read_bytes()))
+    path.write_bytes(turned_clockwise(path.read_bytes()))
     frames, _ = choose_frames(path, read_video_facts(path), VideoConfig())
     assert frames.video_size == frames.size == (64, 96)
     ((_, shown),) = frames.read([3])
     assert shown[:16, -16:].mean() > 200
     assert shown[:16, :16].mean() < 50
-
-
-def _turned_clockwise(film: bytes) -> bytes:
-    """The file with the track's matrix that phones write when they are held upright."""
-    matrix = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, 0, 0, 1 << 30)
-    start = film.index(b"tkhd") + 44  # Behind flags, times, number, duration, layer, volume.
-    return film[:start] + matrix + film[start + len(matrix) :]

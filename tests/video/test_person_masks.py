@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mocoflow_core.video.person_masks import PackedMasks, refine
+from mocoflow_core.video.person_masks import PackedMasks, neighbours, refine
 
 SIZE = 200
 
@@ -67,3 +67,11 @@ def test_packed_masks_come_back_by_number():
     read = dict(packed.read([9, 4]))
     assert list(read) == [4, 9]
     assert np.array_equal(read[9], masks[2])
+
+
+def test_a_mask_is_steadied_by_no_frame_that_may_be_held_out():
+    every_second = np.arange(7) % 2 == 0
+    assert neighbours(2, every_second, reach=1) == []
+    assert neighbours(2, every_second, reach=2) == [0, 4]
+    assert neighbours(3, every_second, reach=1) == [2, 4]
+    assert neighbours(0, every_second, reach=9) == neighbours(6, every_second, reach=9) == []

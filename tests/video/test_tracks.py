@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mocoflow_core.errors import InputError
 from mocoflow_core.perception.blazepose_detector import Detection
-from mocoflow_core.video.followed_person import longest_stay, regions_between
+from mocoflow_core.video.followed_person import follow_person, longest_stay, regions_between
 from mocoflow_core.video.tracks import choose_track, find_tracks
 
 FRAMES = 30
@@ -85,3 +87,50 @@ def test_nobody_is_refused():
 )
 def test_the_longest_stay_bridges_one_missed_frame(present, stay):
     assert longest_stay(np.array([letter == "1" for letter in present]), 1) == stay
+
+
+class Nowhere:
+    """Finds a circle in every frame, and no person in it."""
+
+    def detect(self, pictures, regions):
+        return [[person(300, 200)] for _ in pictures]
+
+    def poses(self, pictures, regions):
+        return [SimpleNamespace(presence=0.1) for _ in pictures]
+
+    detector = landmarks = property(lambda self: self)
+
+
+class Staying(Nowhere):
+    """There in the frames 4 to 9 of ten a second."""
+
+    def __init__(self):
+        self.asked = -1
+
+    def poses(self, pictures, regions):
+        found = []
+        for _ in pictures:
+            self.asked += 1
+            found.append(SimpleNamespace(presence=float(4 <= self.asked < 10)))
+        return found
+
+
+class Blank:
+    indices = np.arange(FRAMES)
+
+    def read(self, wanted):
+        return ((number, np.zeros((8, 8, 3), np.uint8)) for number in wanted)
+
+
+def followed(model):
+    return follow_person(Blank(), 10.0, 5.0, None, model, lambda fraction, text: None)
+
+
+def test_circles_without_a_pose_are_nobody():
+    with pytest.raises(InputError, match="nobody in the video"):
+        followed(Nowhere())
+
+
+def test_somebody_who_leaves_is_named_with_the_part_of_the_video_to_choose():
+    with pytest.raises(InputError, match=r"5\.4 to 5\.9 s .* --clip 5\.4-5\.9"):
+        followed(Staying())

@@ -57,7 +57,7 @@ class FittedBody:
     pose: BodyPose
     readings: dict[str, float]  # what the shape means: stature in metres and Anny's phenotype
     landmark_px: Array  # (T,) rms distance of the landmarks seen; NaN where none is
-    silhouette_iou: Array  # (T,) NaN without a mask
+    silhouette_iou: Array  # (T,) NaN without a mask that may be looked at
     warnings: tuple[str, ...]
 
     @property
@@ -87,6 +87,7 @@ def fit_body(
     configuration: BodyFitConfig,
     frame_indices: NDArray[np.int32] | None = None,
     up_world: Array | None = None,
+    usable: NDArray[np.bool_] | None = None,
     progress: Progress = lambda fraction, text: None,
 ) -> FittedBody:
     """The likeliest movement of one person, given landmarks and masks of an evenly timed clip.
@@ -100,12 +101,17 @@ def fit_body(
         masks: (T, H, W), an empty one says nothing; None leaves the outlines out.
         camera: a pinhole of the landmarks' pixels.
         up_world: (3,) where it is known; people mostly stand upright.
+        usable: (T,) frames that may be looked at, None all; the others are bridged like frames
+            without anybody.
 
     Raises InputError for sizes that disagree.
     """
     _check(sightings, masks, camera)
+    if usable is not None:
+        sightings = sightings.of_frames(usable)
+        masks = None if masks is None else masks & usable[:, None, None]
     body = FittableBody.load()
-    prior = _prior(body, camera, fps, configuration, up_world)
+    prior = _prior(body, camera, fps, configuration, up_world, float(sightings.seen.mean()))
     up = -np.array([0.0, 1.0, 0.0]) if prior.up is None else prior.up
     shape = _usual_shape(body, prior.facts)
     progress(0.0, "guessing where the person faces")
@@ -121,7 +127,9 @@ def fit_body(
         outlines = MaskOutlines.of(body, masks, camera, configuration.masks)
         pose = _onto_masks(outlines, [prior, close], pose, configuration, progress)
         overlaps = outlines.overlaps(pose)
-    return _fitted(body, pose, sightings, overlaps, camera, frame_indices, sized)
+    missed = ~sightings.seen if usable is None else usable & ~sightings.seen
+    warnings = _warnings(missed, overlaps, body.reading("stature_m", pose.shape), sized)
+    return _fitted(body, pose, sightings, overlaps, camera, frame_indices, warnings)
 
 
 def _onto_masks(
@@ -146,6 +154,7 @@ def _prior(
     fps: float,
     configuration: BodyFitConfig,
     up_world: Array | None,
+    seen_share: float,
 ) -> Prior:
     facts = []
     if configuration.height_m is not None:
@@ -153,7 +162,7 @@ def _prior(
     if configuration.gender is not None:
         facts.append(Fact("gender", configuration.gender, 0.1))
     up = None if up_world is None else camera.R @ up_world
-    return Prior(body, 1.0 / fps, configuration.prior, tuple(facts), up)
+    return Prior(body, 1.0 / fps, configuration.prior, tuple(facts), up, seen_share)
 
 
 def _usual_shape(body: FittableBody, facts: Sequence[Fact]) -> Array:
@@ -193,7 +202,7 @@ def _fitted(
     overlaps: Array,
     camera: Camera,
     frame_indices: NDArray[np.int32] | None,
-    sized: bool,
+    warnings: tuple[str, ...],
 ) -> FittedBody:
     posed = PosedBody.of(body, pose)
     world = camera.to_world(posed.vertices()).astype(np.float32)
@@ -206,7 +215,7 @@ def _fitted(
         {name: round(body.reading(name, pose.shape), 3) for name in READINGS},
         landmark_px,
         overlaps,
-        _warnings(sightings, overlaps, body.reading("stature_m", pose.shape), sized),
+        warnings,
     )
 
 
@@ -219,13 +228,12 @@ def _landmark_px(posed: PosedBody, sightings: Sightings, camera: Camera) -> Arra
     return np.where(total > 0, np.sqrt(mean), np.nan)
 
 
-def _warnings(sightings: Sightings, iou: Array, stature_m: float, sized: bool) -> tuple[str, ...]:
+def _warnings(
+    missed: NDArray[np.bool_], iou: Array, stature_m: float, sized: bool
+) -> tuple[str, ...]:
     warnings = []
-    unseen = int((~sightings.seen).sum())
-    if unseen:
-        warnings.append(
-            f"{unseen} of {len(iou)} frames show nobody, or are held out, and are bridged"
-        )
+    if missed.any():
+        warnings.append(f"{missed.sum()} of {len(missed)} frames show nobody and are bridged")
     if np.isfinite(iou).any() and np.nanmedian(iou) < 0.7:
         warnings.append(f"the fitted body overlaps the masks by {np.nanmedian(iou):.2f} only")
     if not sized:

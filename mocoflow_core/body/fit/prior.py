@@ -52,6 +52,7 @@ class Prior:
     configuration: PriorConfig
     facts: Sequence[Fact] = ()
     up: Array | None = None  # (3,) unit, camera axes
+    seen_share: float = 1.0  # of the frames, those that say anything
 
     def __call__(self, pose: BodyPose) -> System:
         return self._frames(pose) + self._smooth(pose) + self._shared(pose)
@@ -130,7 +131,7 @@ class Prior:
         # Each frame counts in full, although its errors are its neighbours': what is shared by all
         # frames has to weigh as much more.
         alike = min(len(pose.places), self.configuration.error_seconds / self.step_s)
-        heavier = float(np.sqrt(max(1.0, alike)))
+        heavier = float(np.sqrt(max(1.0, self.seen_share * alike)))
         weighed = (heavier * slopes, heavier * off)
         return self._common(pose, *weighed)
 

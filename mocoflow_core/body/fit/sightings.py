@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -69,6 +69,16 @@ class Sightings:
             deep,
             BLAZEPOSE_OFFSETS if count == 33 else None,
         )
+
+    def of_frames(self, chosen: NDArray[np.bool_]) -> Sightings:
+        """The same with nothing seen in all frames but the chosen ones (T,).
+
+        Raises InputError where they show nobody.
+        """
+        kept = replace(self, confidence=np.where(chosen[:, None], self.confidence, 0.0))
+        if not kept.seen.any():
+            raise InputError("a frame with a person", "no landmarks at all", "Check the video.")
+        return kept
 
     def points(self, body: FittableBody) -> Mixtures:
         """The body's points that the detector would see, in the mean shape."""

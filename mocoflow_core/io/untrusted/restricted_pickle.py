@@ -23,6 +23,8 @@ from mocoflow_core.io.untrusted.plain_tree import plain_tree
 from mocoflow_core.io.untrusted.records import Admitted, Outside, Record
 from mocoflow_core.io.untrusted.refusal import damaged
 
+# The attribute of a torch state dict with its modules' versions, which are of no use to us.
+_VERSIONS = "_metadata"
 _NEWEST_PROTOCOL = 5
 
 
@@ -188,6 +190,8 @@ class PickleMachine:
 
     def _build(self) -> None:
         state, target = self._stack.pop(), self._stack[-1]
+        if isinstance(target, dict) and isinstance(state, dict) and state.keys() == {_VERSIONS}:
+            return
         if not isinstance(target, Record):
             raise damaged("a state for something that has none")
         target.build(state, self)

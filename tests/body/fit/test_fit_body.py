@@ -139,3 +139,30 @@ def test_what_is_saved_is_a_mesh_file_in_world_coordinates(exact, tmp_path):
         np.testing.assert_array_equal(arrays["vertices"], exact.meshes.vertices)
     with np.load(tmp_path / "fit.npz", allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["angles"], exact.pose.angles)
+
+
+def test_frames_that_may_be_held_out_change_nothing_and_are_bridged():
+    camera, truth = made_camera(), keypoints_of(POSE)
+    usable = np.arange(len(truth)) % 2 == 0
+    masks = silhouettes(PosedBody.of(BODY, POSE).vertices(), BODY.faces, camera)
+    few = KNOWN.model_copy(update={"rough_steps": 8, "steps": 8, "looks": 2})
+
+    def fitted(shift_px):
+        places = seen(truth, camera).places[:, :17].copy()
+        places[~usable] += shift_px
+        outlines = np.where(usable[:, None, None], masks, np.roll(masks, round(shift_px), axis=2))
+        sightings = Sightings.of(places, np.ones(places.shape[:2]))
+        return fit_body(sightings, outlines, camera, FPS, few, usable=usable)
+
+    one, other = fitted(0.0), fitted(15.0)
+    np.testing.assert_array_equal(one.meshes.vertices, other.meshes.vertices)
+    assert np.isnan(one.silhouette_iou).tolist() == (~usable).tolist()
+    assert not any("show nobody" in warning for warning in one.warnings)
+    off = np.linalg.norm(from_hips(fitted_keypoints(one)) - from_hips(truth), axis=-1).mean(1)
+    assert off[~usable][:-1].max() < off[usable].max() + 0.03
+
+
+def test_a_clip_whose_usable_frames_show_nobody_is_refused():
+    sightings = seen(keypoints_of(POSE), made_camera())
+    with pytest.raises(InputError, match="no landmarks"):
+        fit_body(sightings, None, made_camera(), FPS, KNOWN, usable=np.zeros(8, bool))

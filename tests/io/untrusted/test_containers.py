@@ -91,6 +91,27 @@ def test_tensors_become_arrays_wherever_they_lie(files):
     assert same(read_untrusted(files["tensors.npy"]), arrays)
 
 
+@pytest.mark.parametrize("zipped", [True, False])
+def test_state_dicts_of_modules_are_their_tensors(tmp_path, zipped):
+    module = torch.nn.Sequential(torch.nn.Linear(2, 3), torch.nn.BatchNorm1d(3))
+    path = tmp_path / "weights.pth"
+    torch.save(module.state_dict(), path, _use_new_zipfile_serialization=zipped)
+
+    found = read_torch(path)
+
+    assert list(found) == list(module.state_dict())
+    assert all((found[name] == value.numpy()).all() for name, value in module.state_dict().items())
+
+
+def test_other_attributes_of_a_dict_are_refused(tmp_path):
+    weights = torch.nn.Linear(2, 3).state_dict()
+    weights.more = 1
+    torch.save(weights, tmp_path / "weights.pth")
+
+    with pytest.raises(InputError, match="a state for something that has none"):
+        read_torch(tmp_path / "weights.pth")
+
+
 def test_tensors_that_share_memory_become_arrays_of_their_own(tmp_path):
     whole = torch.arange(6.0)
     torch.save([whole, whole[2:4]], tmp_path / "shared.pt")

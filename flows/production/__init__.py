@@ -1,0 +1,1 @@
+"""Deployed runs: a server, its database, a worker, and what they are told to run."""

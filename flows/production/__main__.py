@@ -1,0 +1,52 @@
+"""``python -m flows.production up | down | deploy``, from the repository's root."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flows.production.site import Database, Site, default_folder
+from flows.production.up import bring_up, take_down
+from mocoflow_core.errors import InputError
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+State = Annotated[Path, typer.Option(help="Folder of its state.", default_factory=default_folder)]
+
+
+@app.command()
+def up(
+    state: State,
+    database: Annotated[Database, typer.Option(help="Of the server.")] = Database.SQLITE,
+    port: Annotated[int, typer.Option(help="Of the server.", min=1, max=65535)] = 4200,
+) -> None:
+    """Start database, server and worker on this machine, with all deployments; again is fine."""
+    for line in bring_up(Site(state.resolve(), port, database)):
+        typer.echo(line)
+
+
+@app.command()
+def down(state: State) -> None:
+    """Cancel the runs and end all processes of this machine's site."""
+    site = Site.of_folder(state.resolve())
+    lines = list(take_down(site)) if site else []
+    typer.echo("\n".join(lines) or f"Nothing of {state} is running.")
+
+
+@app.command()
+def deploy() -> None:
+    """Make the pool, automation, deployments and schedules on the server of PREFECT_API_URL."""
+    from flows.production.deploy import deploy as bring_up_to_date
+
+    for line in bring_up_to_date():
+        typer.echo(line)
+
+
+if __name__ == "__main__":
+    try:
+        app()
+    except InputError as error:
+        typer.echo("mocoflow: " + " ".join(str(error).split()), err=True)
+        sys.exit(2)

@@ -1,0 +1,108 @@
+"""Bring a server up to date: work pool, queues, automation, store, deployments, schedules."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
+from prefect.events.schemas.automations import AutomationCore
+from prefect.exceptions import ObjectNotFound
+from prefect.workers.process import ProcessWorker
+
+from flows.data_set_roots import ROOTS, configured_roots
+from flows.production.site import PREFECT
+from flows.production.stores import make_store
+from mocoflow_core.errors import InputError
+
+FOLDER = Path("deployments")
+
+
+def deploy() -> list[str]:
+    """Make or change what the files say, and give a line on each schedule.
+
+    The schedule of a data set runs where its root is configured, and is paused where it is not.
+
+    Raises InputError outside of the repository's root.
+    """
+    pool, zombies = _read("pool.yaml"), _read("zombies.yaml")
+    make_store()
+    with get_client(sync_client=True) as client:
+        _make_pool(client, pool)
+        for queue in pool["queues"]:
+            _make_queue(client, pool["name"], queue)
+        _make_automation(client, AutomationCore.model_validate(zombies))
+        _deploy_flows()
+        return [
+            line
+            for deployment in _read("prefect.yaml")["deployments"]
+            for line in _set_schedules(client, deployment)
+        ]
+
+
+def _read(name: str) -> dict[str, Any]:
+    file = FOLDER / name
+    if not file.is_file():
+        raise InputError(
+            "the repository's root as the working directory",
+            f"{Path.cwd()} without {file}",
+            "Go there.",
+        )
+    return yaml.safe_load(file.read_text())
+
+
+def _make_pool(client: SyncPrefectClient, pool: Mapping[str, Any]) -> None:
+    template = ProcessWorker.get_default_base_job_template()
+    try:
+        client.read_work_pool(pool["name"])
+    except ObjectNotFound:
+        asked = WorkPoolCreate(name=pool["name"], type=pool["type"], base_job_template=template)
+        client.create_work_pool(asked)
+    else:
+        client.update_work_pool(pool["name"], WorkPoolUpdate(base_job_template=template))
+
+
+def _make_queue(client: SyncPrefectClient, pool: str, queue: dict[str, Any]) -> None:
+    try:
+        found = client.read_work_queue_by_name(queue["name"], work_pool_name=pool)
+    except ObjectNotFound:
+        client.create_work_queue(**queue, work_pool_name=pool)
+    else:
+        client.update_work_queue(found.id, **queue)
+
+
+def _make_automation(client: SyncPrefectClient, wanted: AutomationCore) -> None:
+    named = {"automations": {"name": {"any_": [wanted.name]}}}
+    content = wanted.model_dump(mode="json", exclude_unset=True)
+    found = client.request("POST", "/automations/filter", json=named).json()
+    if found:
+        client.request("PUT", "/automations/{id}", path_params={"id": found[0]["id"]}, json=content)
+    else:
+        client.request("POST", "/automations/", json=content)
+
+
+def _deploy_flows() -> None:
+    file = str(FOLDER / "prefect.yaml")
+    words = (*PREFECT, "--no-prompt", "deploy", "--all", "--prefect-file", file)
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"prefect deploy failed:\n{done.stdout}{done.stderr}")
+
+
+def _set_schedules(client: SyncPrefectClient, asked: Mapping[str, Any]) -> Iterator[str]:
+    """Pause or resume the schedules of a data set's deployment; say how each one is."""
+    name = asked["name"]
+    [deployment] = [found for found in client.read_deployments() if found.name == name]
+    for schedule in deployment.schedules if name in ROOTS else ():
+        client.update_deployment_schedule(
+            deployment.id, schedule.id, active=name in configured_roots()
+        )
+    title = f"{client.read_flow(deployment.flow_id).name}/{name}"
+    for schedule in asked["schedules"]:
+        active = name in configured_roots() if name in ROOTS else schedule["active"]
+        state = "runs" if active else f"paused: set {ROOTS[name]} and deploy again"
+        yield f"{title:<26} {schedule['cron']} {schedule['timezone']:<9} {state}"

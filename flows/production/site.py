@@ -1,0 +1,98 @@
+"""One machine's production: which folder, port and database it has, and what its processes see."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT
+from flows.user_folders import data_folder, results_folder
+
+
+class Database(StrEnum):
+    """What the server keeps runs, logs and artifacts in."""
+
+    SQLITE = "sqlite"
+    POSTGRESQL = "postgresql"
+
+
+# All that a site starts has it in its environment, by which it is found again.
+MARK = "MOCOFLOW_SITE"
+PREFECT = (sys.executable, "-m", "prefect")
+AUTHENTICATION = "PREFECT_SERVER_API_AUTH_STRING"
+
+
+def default_folder() -> Path:
+    """Where a site keeps its state (``XDG_STATE_HOME``); a place of its own for root.
+
+    PostgreSQL does not run as root, and whom it runs as may not look into root's home.
+    """
+    if os.geteuid() == 0:
+        return Path("/var/lib/mocoflow")
+    state = os.environ.get("XDG_STATE_HOME")
+    return (Path(state) if state else Path.home() / ".local" / "state") / "mocoflow"
+
+
+@dataclass(frozen=True)
+class Site:
+    """A server, its database and one worker on this machine; nothing listens beyond loopback."""
+
+    folder: Path
+    port: int = 4200
+    database: Database = Database.SQLITE
+
+    @property
+    def pages(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def api(self) -> str:
+        return f"{self.pages}/api"
+
+    @property
+    def logs(self) -> Path:
+        return self.folder / "logs"
+
+    def pid_file(self, name: str) -> Path:
+        return self.folder / f"{name}.pid"
+
+    def environment(self, database_url: str | None = None) -> dict[str, str]:
+        """Of the site's processes: the user's own, with the site's settings.
+
+        Runs are confined to folders: the user's, or else those that mocoflow has among their data.
+        """
+        chosen = {
+            MARK: str(self.folder),
+            "PREFECT_HOME": str(self.folder / "prefect"),
+            "PREFECT_API_URL": self.api,
+            "PREFECT_UI_URL": self.pages,
+            "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+            # The second version of the pages asks hosts elsewhere.
+            "PREFECT_SERVER_UI_V2_ENABLED": "false",
+            "DO_NOT_TRACK": "1",
+            "PREFECT_FLOWS_HEARTBEAT_FREQUENCY": "30",
+            "NO_COLOR": "1",
+        }
+        if AUTHENTICATION in os.environ:
+            chosen["PREFECT_API_AUTH_STRING"] = os.environ[AUTHENTICATION]
+        if database_url:
+            chosen["PREFECT_SERVER_DATABASE_CONNECTION_URL"] = database_url
+        roots = {DATA_ROOTS: str(data_folder()), RESULTS_ROOT: str(results_folder())}
+        return roots | os.environ | chosen
+
+    def save(self) -> None:
+        document = {"port": self.port, "database": self.database}
+        (self.folder / "site.json").write_text(json.dumps(document) + "\n")
+
+    @classmethod
+    def of_folder(cls, folder: Path) -> Site | None:
+        """The site that was last started in a folder, if one ever was."""
+        try:
+            document = json.loads((folder / "site.json").read_text())
+        except OSError:
+            return None
+        return cls(folder, document["port"], Database(document["database"]))

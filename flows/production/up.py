@@ -1,0 +1,140 @@
+"""Everything that deployed runs need on one machine, and its end."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from flows.production.api import answers, ask, wait_for
+from flows.production.postgresql import PostgreSQL
+from flows.production.processes import end_what_is_left, is_running, start, stop
+from flows.production.site import PREFECT, Database, Site
+from mocoflow_core.errors import InputError
+
+POOL = "mocoflow"
+RUNS_AT_ONCE = 2
+WORKER_SETTINGS = "worker.json"
+UNDER_WAY = ("RUNNING", "PENDING", "CANCELLING")
+
+
+def bring_up(site: Site) -> Iterator[str]:
+    """Start what is not running yet, deploy, and say what was done.
+
+    Raises InputError for a port that is taken, and for another database or other folders than
+    what is running has.
+    """
+    _require_the_same(site)
+    _require_the_same_worker(site)
+    site.folder.mkdir(parents=True, exist_ok=True)
+    site.logs.mkdir(exist_ok=True)
+    site.save()
+    url = None
+    if site.database == Database.POSTGRESQL:
+        url = PostgreSQL(site).start()
+        yield "PostgreSQL   runs"
+    if not is_running(site, "server"):
+        _start_server(site, url)
+    _require(wait_for(lambda: answers(site.api), 120.0), site, "server")
+    yield f"server       {site.api}"
+    words = [sys.executable, "-m", "flows.production", "deploy"]
+    subprocess.run(words, env=site.environment(), check=True)
+    if not is_running(site, "worker"):
+        words = ["worker", "start", "--pool", POOL, "--name", _worker()]
+        limit = ["--limit", str(RUNS_AT_ONCE)]
+        (site.folder / WORKER_SETTINGS).write_text(json.dumps(_settings(site)) + "\n")
+        start(site, "worker", [*PREFECT, *words, *limit], site.environment())
+    _require(wait_for(lambda: _is_online(site), 120.0), site, "worker")
+    roots = site.environment()
+    yield f"worker       {_worker()}, {RUNS_AT_ONCE} runs at once"
+    yield f"scenes       below {roots['MOCOFLOW_DATA_ROOTS']}"
+    yield f"results      {roots['MOCOFLOW_RESULTS_ROOT']}"
+    yield f"logs         {site.logs}"
+    yield f"pages        {site.pages}"
+
+
+def take_down(site: Site, grace_s: float = 60.0) -> Iterator[str]:
+    """Cancel what runs, end all processes, and say what was done."""
+    if is_running(site, "worker") and answers(site.api):
+        yield from _cancel_runs(site, grace_s)
+    for name in ("worker", "server"):
+        if stop(site, name):
+            yield f"{name} stopped"
+    if site.database == Database.POSTGRESQL and PostgreSQL(site).stop():
+        yield "PostgreSQL stopped"
+    if left := end_what_is_left(site):
+        yield f"{len(left)} processes that were left behind ended"
+
+
+def _start_server(site: Site, url: str | None) -> None:
+    with socket.socket() as asked:
+        if asked.connect_ex(("127.0.0.1", site.port)) == 0:
+            raise InputError(
+                "a free port for the server", str(site.port), "Choose another: make up PORT=4201."
+            )
+    words = ["server", "start", "--host", "127.0.0.1", "--port", str(site.port)]
+    start(site, "server", [*PREFECT, *words], site.environment(url))
+
+
+def _cancel_runs(site: Site, grace_s: float) -> Iterator[str]:
+    """As the button on a run's page; their finished stages stay in the store."""
+    under_way = _runs(site)
+    for run in under_way:
+        wanted = {"state": {"type": "CANCELLING", "name": "Cancelling"}}
+        ask(site.api, f"/flow_runs/{run['id']}/set_state", wanted)
+    if under_way:
+        wait_for(lambda: not _runs(site), grace_s)
+        yield f"{len(under_way)} runs cancelled: {', '.join(run['name'] for run in under_way)}"
+
+
+def _runs(site: Site) -> list[dict[str, Any]]:
+    wanted = {"flow_runs": {"state": {"type": {"any_": UNDER_WAY}}}}
+    return [
+        run for run in ask(site.api, "/flow_runs/filter", wanted) if not run["parent_task_run_id"]
+    ]
+
+
+def _is_online(site: Site) -> bool:
+    workers = ask(site.api, f"/work_pools/{POOL}/workers/filter", {})
+    return any(w["name"] == _worker() and w["status"] == "ONLINE" for w in workers)
+
+
+def _worker() -> str:
+    return socket.gethostname()
+
+
+def _require(succeeded: bool, site: Site, name: str) -> None:
+    if not succeeded:
+        raise RuntimeError(f"the {name} did not start; {site.logs}/{name}.log says why")
+
+
+def _require_the_same(site: Site) -> None:
+    before = Site.of_folder(site.folder)
+    if before and before != site and is_running(before, "server"):
+        raise InputError(
+            f"the site in {site.folder}, which runs with {before.database} on {before.port}",
+            f"{site.database} on {site.port}",
+            "Take it down first: make down.",
+        )
+
+
+def _require_the_same_worker(site: Site) -> None:
+    """A schedule that is due would otherwise find a worker without the data set's root."""
+    if not is_running(site, "worker"):
+        return
+    before, now = json.loads((site.folder / WORKER_SETTINGS).read_text()), _settings(site)
+    differ = sorted(name for name in before | now if before.get(name) != now.get(name))
+    if differ:
+        raise InputError(
+            "the settings that the running worker was started with",
+            f"another {', '.join(differ)}",
+            "Take it down first: make down.",
+        )
+
+
+def _settings(site: Site) -> dict[str, str]:
+    """What runs are told about folders and stores."""
+    return {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")}

@@ -1,0 +1,154 @@
+"""The commands and health checks of docker-compose.yml, by hand where no container engine runs.
+
+Their words and environment are the file's own; only hosts, ports and folders are this machine's.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.error import HTTPError
+
+import pytest
+import yaml
+
+from flows.production.api import ask, wait_for
+from flows.production.postgresql import PostgreSQL
+from flows.production.processes import heed_interrupts
+from flows.production.site import AUTHENTICATION, Database, Site
+from tests.e2e.production import ROOT, database
+from tests.free_port import free_port
+
+pytestmark = [
+    pytest.mark.e2e,
+    pytest.mark.skipif(database() != Database.POSTGRESQL, reason="PostgreSQL is not installed"),
+]
+SERVICES = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+SECRET = "somebody:a secret, with / and @"
+
+
+class Here:
+    """This machine in place of the containers."""
+
+    def __init__(self, folder: Path, database_url: str) -> None:
+        user, _, place = database_url.partition("://")[2].rpartition("@")
+        self.port, self.health = free_port(), free_port()
+        self.api = f"http://127.0.0.1:{self.port}/api"
+        self.folder = folder
+        self.secrets = {
+            AUTHENTICATION: SECRET,
+            "MOCOFLOW_DATABASE_PASSWORD": user.partition(":")[2],
+            "MOCOFLOW_STORAGE_SECRET": "another secret",
+        }
+        address, _, name = place.partition("/")
+        self.places = {
+            "PREFECT_SERVER_DATABASE_HOST": address.partition(":")[0],
+            "PREFECT_SERVER_DATABASE_PORT": address.partition(":")[2],
+            "PREFECT_SERVER_DATABASE_NAME": name,
+            "PREFECT_API_URL": self.api,
+            "PREFECT_WORKER_WEBSERVER_PORT": str(self.health),
+            "MOCOFLOW_STORE": str(folder / "bucket" / "store"),
+            "MOCOFLOW_DATA_ROOTS": str(folder),
+            "MOCOFLOW_RESULTS_ROOT": str(folder),
+        }
+
+    def environment(self, service: str) -> dict[str, str]:
+        """The service's own, filled in as the container engine does, and nothing else of ours."""
+
+        def filled(value: str) -> str:
+            return re.sub(r"\$\{([A-Z_]+):[?-][^}]*\}", lambda m: self.secrets.get(m[1], ""), value)
+
+        asked = {name: filled(value) for name, value in SERVICES[service]["environment"].items()}
+        kept = ("PATH", "PYTHONPATH", "HOME")
+        base = {name: os.environ[name] for name in kept if name in os.environ}
+        base["PYTHONPATH"] = os.pathsep.join((str(ROOT), base.get("PYTHONPATH", "")))
+        base["PREFECT_HOME"] = str(self.folder / "state" / service)
+        return base | asked | {n: v for n, v in self.places.items() if n in asked}
+
+    def command(self, words: list[str]) -> list[str]:
+        python = {"prefect": [sys.executable, "-m", "prefect"], "python": [sys.executable]}
+        here = {"0.0.0.0": "127.0.0.1", "4200": str(self.port)}
+        return python[words[0]] + [here.get(word, word) for word in words[1:]]
+
+    def is_healthy(self, service: str) -> bool:
+        """What the container engine asks now and then."""
+        kind, *words = SERVICES[service]["healthcheck"]["test"]
+        assert kind == "CMD"
+        words = [w.replace(":4200/", f":{self.port}/") for w in words]
+        words = [w.replace(":8080/", f":{self.health}/") for w in words]
+        return subprocess.run(self.command(words), capture_output=True).returncode == 0
+
+
+@pytest.fixture(scope="module")
+def here():
+    folder = Path(tempfile.mkdtemp(prefix="mocoflow-compose-"))
+    folder.chmod(0o755)
+    site = Site(folder, database=Database.POSTGRESQL)
+    site.logs.mkdir()
+    cluster = PostgreSQL(site)
+    try:
+        yield Here(folder, cluster.start())
+    finally:
+        cluster.stop()
+        shutil.rmtree(folder)
+
+
+@contextmanager
+def running(here, service):
+    """A service from its start to its end, which is in its grace."""
+    words = here.command(SERVICES[service]["command"])
+    grace_s = float(SERVICES[service]["stop_grace_period"].removesuffix("s"))
+    log = here.folder / f"{service}.log"
+    heed_interrupts()
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            words, env=here.environment(service), stdout=output, stderr=output, cwd=here.folder
+        )
+    try:
+        assert wait_for(lambda: here.is_healthy(service), 180.0), log.read_text()
+        yield
+    finally:
+        process.terminate()
+        process.wait(grace_s)
+
+
+@pytest.fixture(scope="module")
+def server(here):
+    with running(here, "server"):
+        yield here
+
+
+def test_the_server_answers_nobody_without_the_password(server, monkeypatch):
+    monkeypatch.delenv(AUTHENTICATION, raising=False)
+    with pytest.raises(HTTPError, match="401"):
+        ask(server.api, "/flows/filter", {})
+    monkeypatch.setenv(AUTHENTICATION, SECRET)
+    assert ask(server.api, "/flows/filter", {}) == []
+
+
+def test_deployments_are_made_and_a_worker_takes_their_runs(server, monkeypatch):
+    monkeypatch.setenv(AUTHENTICATION, SECRET)
+    done = subprocess.run(
+        server.command(SERVICES["deployments"]["command"]),
+        env=server.environment("deployments"),
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "set MOCOFLOW_AIST_ROOT and deploy again" in done.stdout
+    assert (server.folder / "bucket" / "store").is_dir()
+    assert len(ask(server.api, "/deployments/filter", {})) == 7
+    with running(server, "worker-cpu"):
+
+        def online():
+            workers = ask(server.api, "/work_pools/mocoflow/workers/filter", {})
+            return [worker["name"] for worker in workers if worker["status"] == "ONLINE"] == ["cpu"]
+
+        assert wait_for(online, 60.0)

@@ -1,0 +1,81 @@
+"""A site's state is remembered, and its processes see what they need and no more."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from flows.production.postgresql import find_programs
+from flows.production.site import AUTHENTICATION, Database, Site
+from flows.production.up import bring_up
+from mocoflow_core.errors import InputError
+
+
+def test_a_site_is_found_again_in_its_folder(tmp_path):
+    assert Site.of_folder(tmp_path) is None
+    site = Site(tmp_path, 4321, Database.POSTGRESQL)
+    site.save()
+    assert Site.of_folder(tmp_path) == site
+
+
+def test_runs_are_confined_unless_the_user_has_said_where(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    for name in ("MOCOFLOW_DATA_ROOTS", "MOCOFLOW_RESULTS_ROOT"):
+        monkeypatch.delenv(name, raising=False)
+    found = Site(tmp_path).environment()
+    assert found["MOCOFLOW_DATA_ROOTS"] == str(tmp_path / "mocoflow" / "data")
+    assert found["MOCOFLOW_RESULTS_ROOT"] == str(tmp_path / "mocoflow" / "results")
+    monkeypatch.setenv("MOCOFLOW_DATA_ROOTS", "/films")
+    assert Site(tmp_path).environment()["MOCOFLOW_DATA_ROOTS"] == "/films"
+
+
+def test_a_password_of_the_server_is_passed_on_to_its_clients(tmp_path, monkeypatch):
+    monkeypatch.delenv(AUTHENTICATION, raising=False)
+    assert "PREFECT_API_AUTH_STRING" not in Site(tmp_path).environment()
+    monkeypatch.setenv(AUTHENTICATION, "me:secret")
+    assert Site(tmp_path).environment()["PREFECT_API_AUTH_STRING"] == "me:secret"
+
+
+def test_without_postgresql_it_is_said_what_to_install(monkeypatch):
+    monkeypatch.setattr("flows.production.postgresql.PLACES", ("/nowhere/*/bin",))
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(InputError, match="apt install postgresql"):
+        find_programs()
+
+
+@pytest.mark.parametrize("newest", ["9", "17"])
+def test_data_are_opened_with_the_programs_that_made_them(newest, tmp_path, monkeypatch):
+    for version in ("15", newest):
+        folder = tmp_path / version / "bin"
+        folder.mkdir(parents=True)
+        for name in ("initdb", "pg_ctl", "postgres"):
+            said = f"#!/bin/sh\necho 'postgres (PostgreSQL) {version}.4 (Debian {version}.4-1)'\n"
+            (folder / name).write_text(said)
+            (folder / name).chmod(0o755)
+    monkeypatch.setattr("flows.production.postgresql.PLACES", (f"{tmp_path}/*/bin",))
+    monkeypatch.setenv("PATH", "/bin:/usr/bin")
+    monkeypatch.setattr("flows.production.postgresql.shutil.which", lambda _: None)
+    assert find_programs("15") == tmp_path / "15" / "bin"
+    assert find_programs() == tmp_path / str(max(15, int(newest))) / "bin"
+    with pytest.raises(InputError, match="PostgreSQL 12's"):
+        find_programs("12")
+
+
+def test_a_running_site_is_not_changed_into_another_one(tmp_path, monkeypatch):
+    Site(tmp_path, 4321).save()
+    monkeypatch.setattr("flows.production.up.is_running", lambda *_: True)
+    with pytest.raises(InputError, match="make down"):
+        next(bring_up(Site(tmp_path, 4321, Database.POSTGRESQL)))
+
+
+def test_a_running_worker_is_not_left_without_a_root_that_is_new(tmp_path, monkeypatch):
+    site = Site(tmp_path, 4321)
+    site.save()
+    monkeypatch.delenv("MOCOFLOW_AIST_ROOT", raising=False)
+    settings = {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")}
+    (tmp_path / "worker.json").write_text(json.dumps(settings))
+    monkeypatch.setattr("flows.production.up.is_running", lambda *_: True)
+    monkeypatch.setenv("MOCOFLOW_AIST_ROOT", "/sets/aist")
+    with pytest.raises(InputError, match=r"another MOCOFLOW_AIST_ROOT\. Take it down"):
+        next(bring_up(site))
