@@ -50,3 +50,6 @@ if __name__ == "__main__":
     except InputError as error:
         typer.echo("mocoflow: " + " ".join(str(error).split()), err=True)
         sys.exit(2)
+    except RuntimeError as error:
+        typer.echo(f"mocoflow: {error}", err=True)
+        sys.exit(1)

@@ -17,6 +17,8 @@ from mocoflow_core.errors import InputError
 
 POOL = "mocoflow"
 RUNS_AT_ONCE = 2
+# A first start on a busy machine.
+STARTS_WITHIN_S = 300.0
 WORKER_SETTINGS = "worker.json"
 UNDER_WAY = ("RUNNING", "PENDING", "CANCELLING")
 
@@ -38,7 +40,7 @@ def bring_up(site: Site) -> Iterator[str]:
         yield "PostgreSQL   runs"
     if not is_running(site, "server"):
         _start_server(site, url)
-    _require(wait_for(lambda: answers(site.api), 120.0), site, "server")
+    _require(wait_for(lambda: answers(site.api), STARTS_WITHIN_S), site, "server")
     yield f"server       {site.api}"
     words = [sys.executable, "-m", "flows.production", "deploy"]
     subprocess.run(words, env=site.environment(), check=True)
@@ -47,7 +49,7 @@ def bring_up(site: Site) -> Iterator[str]:
         limit = ["--limit", str(RUNS_AT_ONCE)]
         (site.folder / WORKER_SETTINGS).write_text(json.dumps(_settings(site)) + "\n")
         start(site, "worker", [*PREFECT, *words, *limit], site.environment())
-    _require(wait_for(lambda: _is_online(site), 120.0), site, "worker")
+    _require(wait_for(lambda: _is_online(site), STARTS_WITHIN_S), site, "worker")
     roots = site.environment()
     yield f"worker       {_worker()}, {RUNS_AT_ONCE} runs at once"
     yield f"scenes       below {roots['MOCOFLOW_DATA_ROOTS']}"

@@ -137,7 +137,7 @@ def site_command(made: Production, site: Site, command: str) -> str:
     if command == "up":
         words += ["--port", str(site.port), "--database", str(site.database)]
     done = subprocess.run(
-        words, cwd=ROOT, env=made.environment, capture_output=True, text=True, timeout=300.0
+        words, cwd=ROOT, env=made.environment, capture_output=True, text=True, timeout=600.0
     )
     logs = "".join(log.read_text()[-3000:] for log in site.logs.glob("*.log"))
     assert done.returncode == 0, done.stdout + done.stderr + logs

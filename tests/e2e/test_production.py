@@ -87,7 +87,7 @@ def test_parameters_out_of_bounds_are_refused_before_there_is_a_run(deployed, sc
     with pytest.raises(AssertionError) as refused:
         deployed.prefect("deployment", "run", "mocoflow/full", "-p", "preset=turbo")
     assert "'turbo' is not one of" in " ".join(str(refused.value).split())
-    for wrong in ({"seed": -1}, {"devices": 0}, {"budget_s": 0.5}, {"scene": 7}):
+    for wrong in ({"seed": -1}, {"devices": 0}, {"budget_s": 0}, {"scene": 7}):
         with pytest.raises(HTTPError, match="409"):
             deployed.start("mocoflow/full", **wrong)
     assert set(deployed.runs()) == before
