@@ -46,6 +46,7 @@ class Cost(NamedTuple):
 
     cpu_s: float
     wall_s: float
+    around_cpu_s: float = 0.0  # of it the server's and Dask's
     requests: float = 0.0
     up_bytes: float = 0.0
     down_bytes: float = 0.0
@@ -74,7 +75,7 @@ class Surroundings:
         cpu_s = sum(_cpu_s(pid) for pid in self.processes)
         rows, size = _database(self.database) if self.database else (0, 0)
         passed = (self.traffic.requests.total(), self.traffic.up_bytes, self.traffic.down_bytes)
-        return Cost(cpu_s, time.monotonic(), *map(float, passed), float(rows), float(size))
+        return Cost(cpu_s, time.monotonic(), cpu_s, *map(float, passed), float(rows), float(size))
 
 
 def main() -> None:
@@ -85,20 +86,21 @@ def main() -> None:
         write_toy_scene(scene)
     seeds = (arguments.few, arguments.many)
     home = {"PREFECT_HOME": str(folder / "filling"), "XDG_CACHE_HOME": str(folder / "cache")}
-    _benchmark(folder, folder / "filled", seeds[1], [], home)
-    found = {"machine": describe_machine(), "seeds": seeds}
+    if not (folder / "filled/benchmark.html").is_file():
+        _benchmark(folder, folder / "filled", seeds[1], [], home)
     for way in arguments.ways:
         with _surroundings(way, folder / way) as around:
             # The first one imports, migrates and warms up.
             _, few, many = [_measured(folder, way, n, around) for n in (seeds[0], *seeds)]
-            cell = (many - few).over(seeds[1] - seeds[0])
-            found[way] = {
-                "cell": cell._asdict(),
-                "few": few._asdict(),
-                "routes": dict(around.traffic.requests.most_common()),
-            }
-        print(way, json.dumps(found[way]["cell"]), flush=True)
-        (folder / "orchestration.json").write_text(json.dumps(found, indent=1) + "\n")
+        found = {
+            "machine": describe_machine(),
+            "seeds": seeds,
+            "cell": (many - few).over(seeds[1] - seeds[0])._asdict(),
+            "few": few._asdict(),
+            "requests of all": dict(around.traffic.requests.most_common()),
+        }
+        (folder / f"{way}.json").write_text(json.dumps(found, indent=1) + "\n")
+        print(way, json.dumps(found["cell"]), flush=True)
 
 
 def _measured(folder: Path, way: str, seeds: int, around: Surroundings) -> Cost:
