@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ OF_MASK_RCNN = (BOXES, LABELS, SCORES, MASKS)
 OF_KEYPOINT_RCNN = (BOXES, LABELS, SCORES, KEYPOINTS, KEYPOINT_SCORES)
 TITLES = {OF_MASK_RCNN: "Mask R-CNN", OF_KEYPOINT_RCNN: "Keypoint R-CNN"}
 
-Found = Mapping[str, NDArray[np.generic]]
+Found = Mapping[str, NDArray[Any]]
 
 
 class InstanceNetwork(Protocol):

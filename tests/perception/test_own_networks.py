@@ -22,6 +22,9 @@ from mocoflow_core.perception.own_networks import (
 
 GRAPHS = Path(__file__).parents[1] / "data" / "detectors"
 MASK, KEYPOINT = (FileOfNetwork.of(GRAPHS / f"{name}.onnx") for name in ("mask", "keypoint"))
+# The input's shape in the file: three lengths; two of them and an axis without a length.
+FIXED = b"\n\x02\x08\x03\n\x02\x08\x40\n\x02\x08\x40"
+ANY = FIXED[:-2] + b"\x12\x00"
 # What the graphs always say, most confident first.
 RIGHT, LEFT = np.float32([40, 10, 60, 50]), np.float32([10, 10, 30, 50])
 
@@ -38,13 +41,33 @@ def test_boxes_are_of_persons_alone_most_confident_first():
         assert white.corners.shape == (0, 4)
 
 
-def test_pictures_of_any_size_are_taken_and_a_mask_has_theirs():
-    picture = grey(255, 48, 80)
-    picture[5:20, 45:60] = 0
-    (mask,) = own_segmenter(MASK).masks([picture], [RIGHT])
-    np.testing.assert_allclose(mask, picture[..., 0] == 0, atol=1e-6)
+def test_pictures_of_any_size_are_scaled_into_the_graphs_and_boxes_and_masks_back():
+    picture = grey(255, 96, 128)
+    picture[10:40, 90:120] = 0
+    picture[:10] = 20
+    detector = own_segmenter(MASK)
+    (boxes,) = detector.boxes([np.minimum(picture, 80)])
+    np.testing.assert_allclose(boxes.corners, [[80, 20, 120, 96], [20, 20, 60, 96]])
+    (mask,) = detector.masks([np.minimum(picture, 200)], [boxes.corners[0]])
+    assert mask.shape == (96, 128)
+    assert mask[12:38, 92:118].min() > 0.95
+    assert mask[45:90, 10:120].max() < 0.25
+
+
+def test_keypoints_are_put_back_by_middles_of_pixels():
+    (pose,) = own_keypoint_detector(KEYPOINT).keypoints([grey(0, 128, 128)], [2 * LEFT])
+    np.testing.assert_allclose(pose.places[[0, 16]], [[21, 21], [61, 101]], atol=1e-4)
+
+
+def test_nobody_has_no_mask():
     (nobody,) = own_segmenter(MASK).masks([grey(255)], [RIGHT])
     assert not nobody.any()
+
+
+def test_a_graph_for_pictures_of_any_size_is_refused(tmp_path):
+    (tmp_path / "any.onnx").write_bytes(MASK.path.read_bytes().replace(FIXED, ANY))
+    with pytest.raises(InputError, match=r"any.onnx with an input of fixed size"):
+        own_person_detector(of(tmp_path / "any.onnx"))
 
 
 def test_keypoints_are_those_of_the_box_with_confidences_in_bounds():

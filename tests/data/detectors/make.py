@@ -56,7 +56,7 @@ def write(name: str, nodes: list[NodeProto], outputs: list[ValueInfoProto]) -> N
     graph = make_graph(
         [*EVERY, *nodes],
         "detector",
-        [floats("image", 3, "height", "width")],
+        [floats("image", 3, 64, 64)],
         [
             floats("boxes", "n", 4),
             make_tensor_value_info("labels", TensorProto.INT64, ["n"]),
@@ -71,7 +71,7 @@ def write(name: str, nodes: list[NodeProto], outputs: list[ValueInfoProto]) -> N
 
 
 if __name__ == "__main__":
-    write("mask.onnx", MASKS, [floats("masks", "n", 1, "height", "width")])
+    write("mask.onnx", MASKS, [floats("masks", "n", 1, 64, 64)])
     write(
         "keypoint.onnx",
         KEYPOINTS,
