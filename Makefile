@@ -36,7 +36,7 @@ test: install
 e2e: install
 	$(BIN)/python -m pytest -m e2e
 
-# What is lost when something dies or breaks: docs/reliability.md. A quarter of an hour.
+# What is lost when something dies or breaks: docs/reliability.md. A quarter of an hour of CPU.
 faults: install
 	$(BIN)/python -m pytest -m faults
 
