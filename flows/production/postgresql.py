@@ -47,7 +47,7 @@ class PostgreSQL:
 
     @property
     def log(self) -> Path:
-        return self.home / "postgresql.log"
+        return self.site.logs / "database.log"
 
     @property
     def url(self) -> str:
@@ -64,6 +64,8 @@ class PostgreSQL:
         if not (self.data / "PG_VERSION").is_file():
             self._make(programs)
         if not self.is_running():
+            self.log.touch(mode=0o600)
+            self._give_away(self.log)
             options = (
                 f"-p {_free_port()} -c listen_addresses=127.0.0.1 -c unix_socket_directories=''"
             )
