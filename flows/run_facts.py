@@ -79,7 +79,8 @@ def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
     create_table_artifact(rows, key="scores", description=f"Mean scores of {scene}")
     curve = "\n".join([f"# {scene}", "", *_embedded(picture)])
     create_markdown_artifact(curve, key="error-curve", description="Error against run time")
-    link = f"[Report]({report.resolve().as_uri()}): {code(str(report))}"
+    address = report.resolve().as_uri().replace("~", "%7E")  # Two of them would strike through.
+    link = f"[Report]({address}): {code(str(report))}"
     lines = [f"# {scene}", "", link, ""]
     lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [

@@ -47,7 +47,8 @@ def test_the_paper_s_stages_run_and_leave_what_the_fast_ones_leave(paper_run):
     out, record = paper_run
     assert [stage.name for stage in record.stages] == STAGES
     scores = read_scores(out / "scores.parquet")
-    assert {row.method for row in scores} == {"mocoflow", "posed_mesh", "photograph"}
+    methods = {"mocoflow", "posed_mesh", "photograph", "shifted_photograph"}
+    assert {row.method for row in scores} == methods
     assert all(np.isfinite(row.value) for row in scores)
     measured = {row.metric for row in scores}
     assert {"correspondence_mm", "consensus_local_mm", "psnr"} <= measured

@@ -17,7 +17,12 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.io.content_key import digest_file
 from mocoflow_core.io.run_folder import read_run
 from mocoflow_core.io.store import Store
-from mocoflow_core.metrics.curve import CLOCKED_STAGES, CURVE_METRICS, read_curve
+from mocoflow_core.metrics.curve import (
+    CLOCKED_STAGES,
+    CURVE_METRICS,
+    NETWORK_METRICS,
+    read_curve,
+)
 from mocoflow_core.metrics.table import read_scores
 from tests.flows.stages import STAGES
 
@@ -35,7 +40,7 @@ def test_a_run_leaves_everything_that_a_user_keeps(first_run):
         "posed_mesh",
     }
     measured = {row.metric for row in read_curve(out / "error_curve.parquet")}
-    assert measured == set(CURVE_METRICS)
+    assert measured == {*CURVE_METRICS} - {*NETWORK_METRICS}  # which are off by default
     assert read_run(out) == record
     assert json.loads((out / "plan.json").read_text())["decisions"]
 
