@@ -9,7 +9,7 @@ PORT ?= 4200
 SITE = $(BIN)/python -m flows.production
 STATE_FOLDER = $(if $(STATE),--state $(STATE))
 
-.PHONY: install demo up down test e2e faults stability bench check format audit
+.PHONY: install demo up down test e2e cluster faults stability bench check format audit
 
 install: $(INSTALLED)
 
@@ -35,6 +35,10 @@ test: install
 # Whole processes: killed ranks and runs, a server with a worker. Some minutes.
 e2e: install
 	$(BIN)/python -m pytest -m e2e
+
+# Benchmarks in several processes and on a Dask cluster, and who can reach them. Some minutes.
+cluster: install
+	$(BIN)/python -m pytest -m cluster
 
 # What is lost when something dies or breaks: docs/reliability.md. A quarter of an hour of CPU.
 faults: install

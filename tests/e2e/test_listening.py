@@ -12,7 +12,7 @@ import pytest
 from tests.e2e.dask_cluster import ROOT, cluster
 from tests.e2e.sockets import beyond_loopback, listening
 
-pytestmark = pytest.mark.e2e
+pytestmark = pytest.mark.cluster
 
 MAIN = "from flows.command_line import main; main()"
 

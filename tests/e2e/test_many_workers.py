@@ -18,7 +18,7 @@ from mocoflow_core.metrics.curve import read_curve
 from mocoflow_core.metrics.table import read_scores
 from tests.e2e.dask_cluster import ROOT, cluster
 
-pytestmark = pytest.mark.e2e
+pytestmark = pytest.mark.cluster
 
 MAIN = "from flows.command_line import main; main()"
 NAMES = [f"toy/toy/mocoflow/{seed}" for seed in (0, 1)]
