@@ -11,7 +11,7 @@ from mocoflow_core.planning.decision import Force
 from mocoflow_core.planning.repair import repair_where_needed
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 2  # Fits the colours as well, says why; frames that fit far worse are noticed.
+ALGORITHM_VERSION = 3  # The body may have the wrong size.
 
 
 @stage(RepairArtifact, ALGORITHM_VERSION)

@@ -1,4 +1,4 @@
-"""A smooth correction of a body's joints and place, whose bones keep their lengths."""
+"""A smooth correction of a body's joints and place, and of its size."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ class JointCorrection:
         mixing: Array,
         angles: Array,
         root_m: float,
+        size: float,
         clothes_m: float,
     ) -> None:
         """Start without any correction.
@@ -32,11 +33,13 @@ class JointCorrection:
             mixing: (T, S) of ``smooth_mixing``.
             angles: (P,) usual error of each joint about each axis, radians.
             root_m: usual error of the body's place.
+            size: usual error of the body's size, as a logarithm.
             clothes_m: usual distance of clothes from the mesh.
         """
         self._mixing = torch.from_numpy(mixing).float()
         self._angles = torch.from_numpy(angles).float()[:, None]
         self._root_m = root_m
+        self._size = size
         self._clothes_m = clothes_m
         self._bases = torch.from_numpy(skeleton.bases).float()
         self._pivots = torch.from_numpy(skeleton.pivots).float()
@@ -46,10 +49,11 @@ class JointCorrection:
         parts = len(skeleton.parents)
         self.turns = torch.zeros(mixing.shape[1], parts, 3, requires_grad=True)
         self.shifts = torch.zeros(mixing.shape[1], 3, requires_grad=True)
+        self.size = torch.zeros(1, requires_grad=True)
         self.clothes = torch.zeros(parts, requires_grad=True)
 
     def unknowns(self) -> list[Tensor]:
-        return [self.turns, self.shifts, self.clothes]
+        return [self.turns, self.shifts, self.size, self.clothes]
 
     def surprise(self) -> Tensor:
         """Minus the logarithm of how likely such errors are."""
@@ -73,7 +77,13 @@ class JointCorrection:
             turned = above[..., :3] @ below
             turned = torch.cat([turned[..., :3], turned[..., 3:] + above[..., 3:]], -1)
             placed = torch.cat([placed, turned], 1)
-        return placed
+        return self._sized(placed, pivots[:, 0] + move)
+
+    def _sized(self, placed: Tensor, centres: Tensor) -> Tensor:
+        """The whole body larger or smaller about its root (T, 3), all frames alike."""
+        scale = torch.exp(self._size * self.size)
+        centre = centres[:, None, :, None]
+        return torch.cat([scale * placed[..., :3], centre + scale * (placed[..., 3:] - centre)], -1)
 
     def vertices(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         transforms = self.transforms(rows)

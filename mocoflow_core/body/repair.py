@@ -46,6 +46,9 @@ class RepairConfig(ConfigurationPart):
     joint_error_deg: float = Field(4.0, gt=0, description="Usual error about each axis of a joint.")
     stiff_error_deg: float = Field(0.3, gt=0, description="The same where the mesh never bends.")
     root_error_m: float = Field(0.02, gt=0, description="Usual error of the body's place.")
+    size_error: float = Field(
+        0.05, ge=0, description="Usual error of the body's size, as a share; 0: it is right."
+    )
     error_seconds: float = Field(0.5, gt=0, description="How long an error stays alike.")
     clothes_m: float = Field(0.02, gt=0, description="Usual standing off of clothes from the mesh.")
     masks: MaskMisfitConfig = MaskMisfitConfig()
@@ -79,8 +82,9 @@ def repair_body(
 ) -> MeshSequence:
     """The meshes with their joints and place corrected towards what the training frames show.
 
-    The correction is the likeliest one: each joint errs by a few degrees, smoothly in time, bones
-    keep their lengths, clothes stand off by a distance of each part's own. First the outlines are
+    The correction is the likeliest one: each joint errs by a few degrees, smoothly in time, the
+    whole body is too large or too small by a few percent, clothes stand off by a distance of each
+    part's own. First the outlines are
     laid onto the masks, then the colour of each point of the skin must stay the same as well.
     Held-out frames, which are not looked at, and frames between get the correction of the moment.
     Where no error is expected, or no mask shows anybody, the meshes come back as they were.
@@ -138,6 +142,7 @@ def _no_correction(
         mixing,
         expected * angles,
         expected * configuration.root_error_m,
+        expected * configuration.size_error,
         configuration.clothes_m,
     )
 

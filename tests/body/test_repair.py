@@ -230,3 +230,13 @@ def test_one_colour_everywhere_changes_little(
     grey = replace(clip, frames=np.full_like(clip.frames, 128))
     # Half a pixel at this distance is 8 mm.
     assert np.abs(fitted(grey, bent) - repaired).mean() < 0.008
+
+
+def test_a_body_that_is_too_small_is_made_larger_where_it_stands():
+    right = limb(np.radians(np.linspace(-20, 20, FRAMES)))
+    centre = right.vertices.mean(axis=(0, 1))
+    small = replace(right, vertices=(centre + (right.vertices - centre) / 1.08).astype(np.float32))
+    found = fitted(filmed(right), small)
+    height, wanted = (np.ptp(v[..., 1], axis=1).mean() for v in (found, right.vertices))
+    assert height == pytest.approx(wanted, rel=0.02)  # clothes explain some of it
+    assert abs((found - right.vertices)[..., 2].mean()) < 0.02  # metres along the sight
