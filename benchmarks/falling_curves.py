@@ -99,7 +99,7 @@ def _curves(
 ) -> dict[int, list[CurveRow]]:
     """Every seed's curve of one kind of recording."""
     with TemporaryDirectory() as folder:
-        scene = _record(contender.scene, Path(folder) / "scene")
+        scene = record(contender.scene, Path(folder) / "scene")
         prepared = PreparedScene(scene, configuration)
         return {
             seed: [
@@ -110,7 +110,8 @@ def _curves(
         }
 
 
-def _record(name: str, folder: Path) -> Scene:
+def record(name: str, folder: Path) -> Scene:
+    """A recording of one of the kinds, written to a folder."""
     kind = KINDS[name]
     write_scene(named_scene(kind.recording), folder)
     kind.cut(folder)

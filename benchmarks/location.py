@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.body.ingest import IngestedMeshes
-from mocoflow_core.body.location import LocationConfig, locate_body
+from mocoflow_core.body.location import locate_body
+from mocoflow_core.body.location_config import LocationConfig
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.silhouette import silhouettes
 from mocoflow_core.capture.clip import Clip

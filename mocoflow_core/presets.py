@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from mocoflow_core.body.location import LocationConfig
+from mocoflow_core.body.location_config import LocationConfig
 from mocoflow_core.body.repair import RepairConfig
 from mocoflow_core.capture.extract import CaptureConfig
 from mocoflow_core.configuration import ConfigurationPart

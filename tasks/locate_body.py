@@ -5,11 +5,11 @@ from __future__ import annotations
 from mocoflow_core.artifacts import ClipArtifact, LocationArtifact, MeshArtifact
 from mocoflow_core.body import location
 from mocoflow_core.body.ingest import IngestedMeshes
-from mocoflow_core.body.location import LocationConfig
+from mocoflow_core.body.location_config import LocationConfig
 from mocoflow_core.capture.clip import Clip
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 3  # Wrong masks lose their say; masks that are cut keep theirs.
+ALGORITHM_VERSION = 4  # A given location stays where another explains the masks hardly better.
 
 
 @stage(LocationArtifact, ALGORITHM_VERSION)
@@ -25,4 +25,8 @@ def locate_body(
         Clip.load(work.open(clip)), IngestedMeshes.load(work.open(meshes)), search, work.progress
     )
     located.save(work.folder)
-    return {"quality": located.quality, "warnings": list(located.warnings)}
+    return {
+        "quality": located.quality,
+        "adopted": located.adopted,
+        "warnings": list(located.warnings),
+    }

@@ -11,7 +11,7 @@ from mocoflow_core.planning.decision import Force
 from mocoflow_core.planning.repair import repair_where_needed
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 3  # The body may have the wrong size.
+ALGORITHM_VERSION = 4  # Near and far cost alike; a place that was searched may be far off.
 
 
 @stage(RepairArtifact, ALGORITHM_VERSION)
@@ -29,7 +29,8 @@ def repair_body(
     """
     seen = Clip.load(work.open(clip))
     given = MeshSequence.load(work.open(bodies) / "meshes.npz")
-    meshes, decision = repair_where_needed(seen, given, repair, force, work.progress)
+    usual = repair.after_search() if bodies.holds("adopted") else repair
+    meshes, decision = repair_where_needed(seen, given, usual, force, work.progress)
     meshes.save(work.folder / "meshes.npz")
     (work.folder / "decision.json").write_text(decision.model_dump_json(indent=1))
     return {"repaired": decision.needed, "warnings": list(check_agreement(seen, meshes))}

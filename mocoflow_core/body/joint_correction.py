@@ -53,7 +53,14 @@ class JointCorrection:
         self.clothes = torch.zeros(parts, requires_grad=True)
 
     def unknowns(self) -> list[Tensor]:
-        return [self.turns, self.shifts, self.size, self.clothes]
+        """What is searched."""
+        every = [self.turns, self.shifts, self.size, self.clothes]
+        return [unknown for unknown in every if unknown.requires_grad]
+
+    def doubt_size(self, least: float) -> None:
+        """Take the given size for right from now on if the error found so far is below a share."""
+        if abs(float(self._size * self.size.detach())) < least:
+            self.size = torch.zeros(1)
 
     def surprise(self) -> Tensor:
         """Minus the logarithm of how likely such errors are."""

@@ -21,6 +21,7 @@ class LocatedMeshes:
     translations: Array  # (T, 3) metres, what was added in the train camera's axes
     residual: Array  # (T,) 1 - overlap of the frame's own best placement; nan where not searched
     confidence: Array  # (T,) 0 where the location is interpolated
+    adopted: bool  # whether the meshes stand there, or where they were given
     warnings: tuple[str, ...]
 
     @property
@@ -43,6 +44,7 @@ class LocatedMeshes:
                 translations=self.translations,
                 residual=self.residual,
                 confidence=self.confidence,
+                adopted=self.adopted,
                 warnings=np.array(self.warnings, dtype=np.str_),
             )
 
@@ -55,5 +57,6 @@ class LocatedMeshes:
                 arrays["translations"],
                 arrays["residual"],
                 arrays["confidence"],
+                bool(arrays["adopted"]),
                 tuple(str(warning) for warning in arrays["warnings"]),
             )

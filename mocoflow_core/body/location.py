@@ -11,59 +11,28 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from mocoflow_core.body.agreement import is_cut
 from mocoflow_core.body.grid_search import Placement, first_guess, search_grid
 from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.body.located_meshes import LocatedMeshes
-from mocoflow_core.body.mask_crop import NEAR_M, MaskCrop, facing
+from mocoflow_core.body.location_config import LocationConfig
+from mocoflow_core.body.location_trust import (
+    crop_overlap,
+    explains_more,
+    grid_crop,
+    location_warnings,
+    placement_confidence,
+)
+from mocoflow_core.body.mask_crop import MaskCrop, facing
 from mocoflow_core.body.outline_fit import fit_outline
 from mocoflow_core.body.robust_path import robust_path
 from mocoflow_core.capture.clip import Clip
-from mocoflow_core.capture.strange_frames import listed
-from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 
 Array = NDArray[np.float64]
 # Where no frame can be trusted at all, all count alike.
 EVEN_CONFIDENCE = 0.01
-
-
-class LocationConfig(ConfigurationPart):
-    """How finely the location is searched, and how smooth it is in time."""
-
-    spans: tuple[float, ...] = Field(
-        (0.4, 0.15, 0.05), description="Each level tries depths up to this share nearer or farther."
-    )
-    depths: int = Field(5, ge=3, description="Depths tried on each level.")
-    grid_px: int = Field(96, ge=16, description="Side of the crop the grid is searched on, pixels.")
-    outline_px: int = Field(
-        320, ge=32, description="Side of the crop the outline is fitted on, pixels."
-    )
-    crop_pad: float = Field(
-        1.5, ge=1, description="Side of the crops, times the longer side of the mask's box."
-    )
-    outline_iterations: int = Field(8, ge=0, description="Most steps of the outline fit.")
-    usual_offset_m: float = Field(
-        0.02, gt=0, description="How far clothes or wide masks usually move an outline, metres."
-    )
-    least_overlap: float = Field(
-        0.4, ge=0, lt=1, description="Frames that overlap less say nothing of the location."
-    )
-    cut_power: float = Field(
-        4.0, ge=0, description="Confidence falls with this power of the share of the body in sight."
-    )
-    doubtful: float = Field(
-        0.05, ge=0, lt=1, description="Frames of less confidence are told of in a warning."
-    )
-    depth_noise_m: float = Field(0.03, gt=0, description="Usual error of a frame's depth, metres.")
-    lateral_noise_m: float = Field(
-        0.005, gt=0, description="Usual error of a frame's lateral position, metres."
-    )
-    acceleration_m_s2: float = Field(
-        4.0, gt=0, description="Usual acceleration of the body's centre, metres per square second."
-    )
 
 
 def locate_body(
@@ -77,7 +46,9 @@ def locate_body(
     Root-centred meshes are searched from the mask's size and from their first translations, others
     from where they are given. Frames whose place disagrees with those around them, whatever their
     mask shows, lose their say. Held-out frames, frames without a mask and frames between those of
-    the clip are interpolated.
+    the clip are interpolated. Bodies that came with a location keep it where the found one does
+    not explain the masks far better: their joints are wrong then, and a place that was fitted to
+    wrong joints is the worse one.
 
     Raises InputError when no mask shows the person.
     """
@@ -96,13 +67,18 @@ def locate_body(
         placement = _place(clip, position, posed[row], ingested.meshes.faces, starts, configuration)
         found[row] = centres[row] + placement.translation
         residual[row] = 1 - placement.overlap
-        confidence[row] = _confidence(clip, posed[row], placement, configuration)
+        confidence[row] = placement_confidence(clip, posed[row], placement, configuration)
         progress((done + 1) / len(searched), f"located frame {numbers[row]}")
     if not confidence.any():
         confidence[rows] = EVEN_CONFIDENCE
     path, kept = _smooth(clip, numbers, found, confidence, configuration)
     confidence = confidence * kept
     translations = path - centres
+    adopted = not ingested.located or explains_more(
+        clip, searched, posed[rows], ingested.meshes.faces, residual[rows], configuration
+    )
+    if not adopted:
+        translations = np.zeros_like(translations)
     world = clip.camera.to_world(posed + translations[:, None])
     cut = numbers[rows[[is_cut(clip.masks[position]) for position in searched]]]
     return LocatedMeshes(
@@ -110,7 +86,8 @@ def locate_body(
         translations,
         residual,
         confidence,
-        _warnings(numbers, cut, residual, confidence, configuration),
+        adopted,
+        location_warnings(numbers, cut, residual, confidence, adopted, configuration),
     )
 
 
@@ -139,11 +116,11 @@ def _place(
 ) -> Placement:
     """The best translation of one frame's body, found from its mask alone."""
     mask, pad = clip.masks[position], configuration.crop_pad
-    grid = MaskCrop.around(mask, clip.camera, configuration.grid_px, pad)
+    grid = grid_crop(mask, clip, configuration)
     fine = MaskCrop.around(mask, clip.camera, configuration.outline_px, pad)
     # A given place far nearer than the true one fills the crop, where no shift improves it.
     starts = [first_guess(points, faces, grid), *starts]
-    start = max(starts, key=lambda start: _overlap(points + start, faces, grid))
+    start = max(starts, key=lambda start: crop_overlap(points + start, faces, grid))
     front = facing(points + start, faces)
     best = search_grid(points, front, grid, start, configuration.spans, configuration.depths)
     front = facing(points + best.translation, faces)
@@ -155,25 +132,7 @@ def _place(
         configuration.outline_iterations,
         configuration.usual_offset_m,
     )
-    return Placement(refined, _overlap(points + refined, front, fine))
-
-
-def _overlap(points: Array, faces: NDArray[np.int32], crop: MaskCrop) -> float:
-    drawn, mask = crop.draw(points, faces) & crop.seen, crop.coverage > 0.5
-    return float((drawn & mask).sum() / max((drawn | mask).sum(), 1))
-
-
-def _confidence(
-    clip: Clip, points: Array, placement: Placement, configuration: LocationConfig
-) -> float:
-    """How well the placed body (V, 3) fits the mask, and how much of it the image shows."""
-    least = configuration.least_overlap
-    trust = max(placement.overlap - least, 0.0) / (1 - least)
-    placed = (points + placement.translation) @ clip.camera.K.T
-    pixels = placed[:, :2] / np.maximum(placed[:, 2:], NEAR_M)
-    size = (clip.camera.width, clip.camera.height)
-    in_sight = float(((pixels >= 0) & (pixels <= size)).all(axis=1).mean())
-    return trust * in_sight**configuration.cut_power
+    return Placement(refined, crop_overlap(points + refined, front, fine))
 
 
 def _smooth(
@@ -216,30 +175,3 @@ def _source_step_s(clip: Clip) -> float:
     if len(working) < 2:
         return 1.0 / clip.fps
     return 1.0 / (clip.fps * float(np.median(np.diff(working))))
-
-
-def _warnings(
-    numbers: NDArray[np.int32],
-    cut: NDArray[np.int32],
-    residual: Array,
-    confidence: Array,
-    configuration: LocationConfig,
-) -> tuple[str, ...]:
-    """``numbers`` (T,) of the source; ``cut`` those of masks that the border cuts."""
-    searched = np.isfinite(residual)
-    overlap = 1 - float(np.median(residual[searched]))
-    doubtful = numbers[searched & (confidence <= configuration.doubtful)]
-    warnings = []
-    if len(cut):
-        warnings.append(
-            f"{len(cut)} of {searched.sum()} masks are cut by the image border "
-            f"({listed(cut.tolist())}): the body is located from what is seen of it"
-        )
-    if len(doubtful):
-        warnings.append(
-            f"{len(doubtful)} of {searched.sum()} masks fit badly or disagree with the frames "
-            f"around ({listed(doubtful.tolist())}): the location there follows its neighbours"
-        )
-    if overlap < configuration.least_overlap + 0.2:
-        warnings.append(f"the located body overlaps the masks by {overlap:.2f} only")
-    return tuple(warnings)

@@ -133,9 +133,13 @@ class MaskMisfit:
         configuration = self._configuration
         world = blend(targets.weights, correction.transforms(self._rows), targets.places)
         pixels, depth = project(self._camera, world)
+        _, given_depth = project(self._camera, targets.places)
         focal = torch.from_numpy(np.diagonal(self._camera.K)[:2].copy()).float()
-        off = ((pixels - targets.pixels) / focal * depth * targets.normals).sum(-1)
-        off = off + correction.stand_off(targets.weights)
+        # Lengths where the estimate stands: the same picture must cost the same near and far, or
+        # small and near would seem likelier.
+        off = ((pixels - targets.pixels) / focal * given_depth * targets.normals).sum(-1)
+        nearer = (given_depth / depth)[..., 0]
+        off = off + nearer * correction.stand_off(targets.weights)
         squared = off * off
         robust = squared / (1.0 + squared / outlier_m**2)
         usual = configuration.independent_points / configuration.outline_error_m**2

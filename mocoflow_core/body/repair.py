@@ -46,8 +46,14 @@ class RepairConfig(ConfigurationPart):
     joint_error_deg: float = Field(4.0, gt=0, description="Usual error about each axis of a joint.")
     stiff_error_deg: float = Field(0.3, gt=0, description="The same where the mesh never bends.")
     root_error_m: float = Field(0.02, gt=0, description="Usual error of the body's place.")
+    searched_error_m: float = Field(
+        0.12, gt=0, description="The same where the place was searched from the masks."
+    )
     size_error: float = Field(
         0.05, ge=0, description="Usual error of the body's size, as a share; 0: it is right."
+    )
+    least_size_error: float = Field(
+        0.03, ge=0, description="Smaller ones than this may be errors of depth: the size is right."
     )
     error_seconds: float = Field(0.5, gt=0, description="How long an error stays alike.")
     clothes_m: float = Field(0.02, gt=0, description="Usual standing off of clothes from the mesh.")
@@ -55,6 +61,13 @@ class RepairConfig(ConfigurationPart):
     colours: ColourMisfitConfig = ColourMisfitConfig()
     by_masks: RoundsConfig = RoundsConfig(rounds=12, steps=12, rate=0.15, outlier_m=(0.08, 0.02))
     by_both: RoundsConfig = RoundsConfig(rounds=6, steps=20, rate=0.1, outlier_m=(0.02, 0.02))
+
+    def after_search(self) -> RepairConfig:
+        """Where the place was found from the masks and the size the body came with.
+
+        Such a place errs by more, and says nothing of the size.
+        """
+        return self.model_copy(update={"root_error_m": self.searched_error_m, "size_error": 0.0})
 
 
 def outlines_apart(clip: Clip, meshes: MeshSequence, configuration: RepairConfig) -> float:
@@ -105,6 +118,7 @@ def repair_body(
     # Sums over several threads differ in their last bit from run to run.
     with torch_threads(1):
         _fit_masks(correction, masks, configuration.by_masks, progress)
+        correction.doubt_size(configuration.least_size_error)
         if configuration.colours.independent_points:
             _fit_both(correction, masks, colours, configuration.by_both, progress)
         with torch.no_grad():

@@ -10,7 +10,8 @@ import pytest
 
 from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.body.located_meshes import LocatedMeshes
-from mocoflow_core.body.location import LocationConfig, locate_body
+from mocoflow_core.body.location import locate_body
+from mocoflow_core.body.location_config import LocationConfig
 from mocoflow_core.body.silhouette import silhouettes
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.errors import InputError
