@@ -34,7 +34,7 @@ from mocoflow_core.synthetic.scene_writer import write_scene
 SETTINGS = ("schedule.coarse_steps=200", "schedule.fine_steps=100", "schedule.threads=1")
 MOTIONS = ("turn", "dance")
 HEADER = (
-    "| scene | joints, degrees | place, cm | found anew | repair, s "
+    "| scene | joints, degrees | place, cm | place searched | repair, s "
     "| keypoints, mm: given -> learned | across the sight | along it "
     "| outline IoU: given -> repaired | consensus, mm: given -> learned "
     "| unseen views: PSNR, dB | IoU |"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mocoflow_core.body.ingest import IngestedMeshes
 from mocoflow_core.body.located_meshes import LocatedMeshes
@@ -208,6 +209,31 @@ def test_what_is_given_is_where_the_search_starts(masks):
     given = IngestedMeshes(replace(MESHES, vertices=wrong.astype(np.float32)), "world", False)
     located = locate_body(clip_of(masks), given, LocationConfig())
     assert np.abs(np.median(located.translations, axis=0) + offset).max() < 0.03
+
+
+def given_in_world(in_camera) -> IngestedMeshes:
+    vertices = CAMERA.to_world(in_camera).astype(np.float32)
+    return IngestedMeshes(replace(MESHES, vertices=vertices), "world", located=True)
+
+
+def test_a_trusted_place_stays_where_the_poses_are_wrong(masks):
+    # Everyone bows to the side: no place explains such masks.
+    centres = IN_CAMERA.mean(axis=1, keepdims=True)
+    bow = Rotation.from_euler("z", 50, degrees=True).as_matrix()
+    given = given_in_world((IN_CAMERA - centres) @ bow.T + centres)
+    located = locate_body(clip_of(masks), given, LocationConfig())
+    assert not located.adopted
+    np.testing.assert_array_equal(located.translations, 0)
+    assert np.abs(located.meshes.vertices - given.meshes.vertices).max() < 1e-6
+    [warning] = located.warnings
+    assert "the given location stays" in warning
+
+
+def test_a_trusted_place_is_left_where_another_explains_the_masks(masks):
+    given = given_in_world(IN_CAMERA + np.array([0.4, 0.1, 0.3]))
+    located = locate_body(clip_of(masks), given, LocationConfig())
+    assert located.adopted
+    assert np.abs(located.meshes.vertices - MESHES.vertices).max() < 0.1
 
 
 @pytest.mark.parametrize("distance", [2.0, 8.0, 40.0])

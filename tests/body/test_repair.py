@@ -5,9 +5,12 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+import torch
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from mocoflow_core.body.articulation import articulate
+from mocoflow_core.body.joint_correction import JointCorrection
 from mocoflow_core.body.mask_misfit import MaskMisfit, MaskMisfitConfig, expected_share
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
@@ -168,6 +171,25 @@ def test_masks_away_from_the_body_give_finite_meshes(
     assert np.isfinite(fitted(replace(clip, masks=elsewhere), bent)).all()
 
 
+def test_what_gives_the_same_picture_costs_the_same_near_and_far(
+    truth: MeshSequence, bent: MeshSequence
+) -> None:
+    rows = np.arange(FRAMES)
+    masks = MaskMisfit(filmed(truth), rows, rows, truth.faces, CONFIGURATION.masks)
+    skeleton = articulate(bent.vertices, bent.faces, parts=6, blend_m=0.04)
+    usual = np.full(len(skeleton.parents), 0.1)
+    correction = JointCorrection(skeleton, bent.vertices, np.eye(FRAMES), usual, 1.0, 1.0, 0.02)
+    targets = masks.look(correction)
+    given = masks(correction, targets, 0.08)
+    towards_camera = camera().centre_world - skeleton.pivots[:, 0]
+    with torch.no_grad():
+        correction.size.fill_(np.log(0.9))
+        correction.shifts.copy_(torch.from_numpy(0.1 * towards_camera))
+    # Sums of float32 over a thousand points.
+    moved = masks(correction, targets, 0.08)
+    assert moved.item() == pytest.approx(given.item(), rel=1e-4)
+
+
 def test_where_no_error_is_expected_the_estimate_is_left_as_it_came(
     truth: MeshSequence, bent: MeshSequence
 ) -> None:
@@ -240,3 +262,19 @@ def test_a_body_that_is_too_small_is_made_larger_where_it_stands():
     height, wanted = (np.ptp(v[..., 1], axis=1).mean() for v in (found, right.vertices))
     assert height == pytest.approx(wanted, rel=0.02)  # clothes explain some of it
     assert abs((found - right.vertices)[..., 2].mean()) < 0.02  # metres along the sight
+
+
+def test_a_size_that_is_wrong_by_little_is_taken_for_right():
+    right = limb(np.radians(np.linspace(-20, 20, FRAMES)))
+    centre = right.vertices.mean(axis=(0, 1))
+    small = replace(right, vertices=(centre + (right.vertices - centre) / 1.015).astype(np.float32))
+    found = repair_body(filmed(right), small, 1.0, CONFIGURATION, silent).vertices
+    across = np.linalg.norm(np.ptp(found, axis=1), axis=-1).mean()
+    given = np.linalg.norm(np.ptp(small.vertices, axis=1), axis=-1).mean()
+    assert across == pytest.approx(given, rel=0.005)
+
+
+def test_a_place_that_was_searched_may_err_by_more_and_says_nothing_of_the_size():
+    usual, searched = RepairConfig(), RepairConfig().after_search()
+    assert searched.root_error_m > 2 * usual.root_error_m
+    assert (usual.size_error > 0, searched.size_error) == (True, 0)
