@@ -16,6 +16,7 @@ from pathlib import Path
 from urllib.error import HTTPError
 
 import pytest
+import s3fs
 import yaml
 
 from flows.production.api import ask, wait_for
@@ -38,7 +39,7 @@ class Here:
 
     def __init__(self, folder: Path, database_url: str) -> None:
         user, _, place = database_url.partition("://")[2].rpartition("@")
-        self.port, self.health = free_port(), free_port()
+        self.port, self.health, self.storage = free_port(), free_port(), free_port()
         self.api = f"http://127.0.0.1:{self.port}/api"
         self.folder = folder
         self.secrets = {
@@ -53,7 +54,7 @@ class Here:
             "PREFECT_SERVER_DATABASE_NAME": name,
             "PREFECT_API_URL": self.api,
             "PREFECT_WORKER_WEBSERVER_PORT": str(self.health),
-            "MOCOFLOW_STORE": str(folder / "bucket" / "store"),
+            "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.storage}",
             "MOCOFLOW_DATA_ROOTS": str(folder),
             "MOCOFLOW_RESULTS_ROOT": str(folder),
         }
@@ -72,9 +73,20 @@ class Here:
         return base | asked | {n: v for n, v in self.places.items() if n in asked}
 
     def command(self, words: list[str]) -> list[str]:
-        python = {"prefect": [sys.executable, "-m", "prefect"], "python": [sys.executable]}
-        here = {"0.0.0.0": "127.0.0.1", "4200": str(self.port)}
-        return python[words[0]] + [here.get(word, word) for word in words[1:]]
+        rclone = str(Path(sys.executable).with_name("rclone"))
+        programs = {
+            "prefect": [sys.executable, "-m", "prefect"],
+            "python": [sys.executable],
+            "rclone": [rclone],
+            "serve": [rclone, "serve"],  # its image's entry point is the program
+        }
+        here = {
+            "0.0.0.0": "127.0.0.1",
+            "4200": str(self.port),
+            ":7070": f"127.0.0.1:{self.storage}",
+            "/storage": str(self.folder / "storage"),
+        }
+        return programs[words[0]] + [here.get(word, word) for word in words[1:]]
 
     def is_healthy(self, service: str) -> bool:
         """What the container engine asks now and then."""
@@ -82,7 +94,9 @@ class Here:
         assert kind == "CMD"
         words = [w.replace(":4200/", f":{self.port}/") for w in words]
         words = [w.replace(":8080/", f":{self.health}/") for w in words]
-        return subprocess.run(self.command(words), capture_output=True).returncode == 0
+        words = [w.replace(":7070", f":{self.storage}") for w in words]
+        asked = self.environment(service)
+        return subprocess.run(self.command(words), env=asked, capture_output=True).returncode == 0
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +146,27 @@ def test_the_server_answers_nobody_without_the_password(server, monkeypatch):
     assert ask(server.api, "/flows/filter", {}) == []
 
 
-def test_deployments_are_made_and_a_worker_takes_their_runs(server, monkeypatch):
+@pytest.fixture(scope="module")
+def storage(here):
+    with running(here, "storage"):
+        yield here
+
+
+def bucket(here, secret):
+    """The store's bucket as somebody with this password sees it."""
+    endpoint = here.places["AWS_ENDPOINT_URL"]
+    return s3fs.S3FileSystem(
+        key="mocoflow", secret=secret, endpoint_url=endpoint, skip_instance_cache=True
+    )
+
+
+def test_the_object_store_wants_its_password(storage):
+    with pytest.raises(PermissionError):
+        bucket(storage, "a guess").ls("")
+    assert bucket(storage, storage.secrets["MOCOFLOW_STORAGE_SECRET"]).ls("") == []
+
+
+def test_deployments_are_made_and_workers_take_their_runs(server, storage, monkeypatch):
     monkeypatch.setenv(AUTHENTICATION, SECRET)
     done = subprocess.run(
         server.command(SERVICES["deployments"]["command"]),
@@ -143,12 +177,14 @@ def test_deployments_are_made_and_a_worker_takes_their_runs(server, monkeypatch)
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "set MOCOFLOW_AIST_ROOT and deploy again" in done.stdout
-    assert (server.folder / "bucket" / "store").is_dir()
+    kept = bucket(storage, storage.secrets["MOCOFLOW_STORAGE_SECRET"])
+    assert kept.ls("") == ["mocoflow"]
     assert len(ask(server.api, "/deployments/filter", {})) == 7
-    with running(server, "worker-cpu"):
+    for name in ("cpu", "gpu"):
+        with running(server, f"worker-{name}"):
+            assert wait_for(lambda name=name: name in online(server), 60.0)
 
-        def online():
-            workers = ask(server.api, "/work_pools/mocoflow/workers/filter", {})
-            return [worker["name"] for worker in workers if worker["status"] == "ONLINE"] == ["cpu"]
 
-        assert wait_for(online, 60.0)
+def online(here):
+    workers = ask(here.api, "/work_pools/mocoflow/workers/filter", {})
+    return [worker["name"] for worker in workers if worker["status"] == "ONLINE"]
