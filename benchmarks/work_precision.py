@@ -115,7 +115,8 @@ class Study:
     def _run(self, scene: str, setting: Setting, seed: int) -> None:
         configuration = with_settings(setting.configuration, ONE_THREAD)
         prepared = self._prepare(scene, configuration)
-        result, scores = prepared.train(configuration, seed)
+        trained = prepared.train(configuration, seed)
+        result, scores = trained.result, trained.scores
         row = Row(
             scene,
             setting.knob,

@@ -107,7 +107,12 @@ class RemoteFiles:
         asked = {"Bucket": bucket, "Prefix": f"{folder}/" if folder else ""}
         found: list[OpenUpload] = []
         while True:
-            page = self._ask(lambda: self._filesystem.call_s3("list_multipart_uploads", **asked))
+            try:
+                page = self._ask(
+                    lambda: self._filesystem.call_s3("list_multipart_uploads", **asked)
+                )
+            except FileNotFoundError:  # What some stores say where no upload is open.
+                return found
             for upload in page.get("Uploads", ()):
                 path = upload["Key"][len(asked["Prefix"]) :]
                 begun_at = upload["Initiated"].timestamp()

@@ -1,14 +1,20 @@
 """The work-precision study: its sweeps, its yardstick, its verdicts and what it writes."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from benchmarks.knobs import BUDGETS_S, KNOBS, budget, together
+from benchmarks import work_precision
+from benchmarks.knobs import BUDGETS_S, DEFAULT, KNOBS, budget, together
 from benchmarks.precision_chart import sweep_seeds, write_chart
 from benchmarks.precision_document import write_document
 from benchmarks.precision_front import beats_default, default_of, gain_db, verdict
 from benchmarks.precision_rows import Point, Row, points_of, read_rows, write_rows
+from benchmarks.scene_study import Trained
+from benchmarks.work_precision import Study
 from mocoflow_core.presets import fast
+from mocoflow_core.training.clock import Seconds
 
 
 def _row(knob="default", value="", cpu_s=20.0, psnr=20.0, scene="turn", seed=0):
@@ -40,6 +46,31 @@ def test_a_budget_changes_nothing_but_the_budget():
     unlimited = configuration.schedule.model_copy(update={"budget_s": None})
     assert configuration.schedule.budget_s == BUDGETS_S[0]
     assert configuration.model_copy(update={"schedule": unlimited}) == fast()
+
+
+class Prepared:
+    """A scene whose optimisation is done at once."""
+
+    spent = Seconds(3.0, 4.0)
+
+    def __init__(self, scene, configuration):
+        assert configuration.schedule.threads == 1
+
+    def train(self, configuration, seed):
+        result = SimpleNamespace(steps=750, rays=configuration.schedule.rays, cpu_s=16.0)
+        return Trained(result, {"psnr_union": 20.0, "mask_iou": 0.97}, None)
+
+
+def test_a_study_measures_each_setting_once_and_goes_on_from_its_table(tmp_path, monkeypatch):
+    monkeypatch.setattr(work_precision, "PreparedScene", Prepared)
+    monkeypatch.setattr(work_precision, "_write", lambda name, folder: None)
+    table = tmp_path / "rows.csv"
+    study = Study(["turn"], [], table, tmp_path)
+    study.measure([DEFAULT, *KNOBS[1].settings], range(2))
+    assert len(study.rows) == 2 * (1 + len(KNOBS[1].settings))
+    assert read_rows(table) == study.rows
+    monkeypatch.setattr(Prepared, "train", None)
+    Study(["turn"], read_rows(table), table, tmp_path).measure([DEFAULT], range(2))
 
 
 def test_rows_come_back_from_their_table(tmp_path):

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+import s3fs
 
 from mocoflow_core.artifacts import ClipArtifact, PlanArtifact
 from mocoflow_core.io.garbage import age_s, judge, users
@@ -194,6 +195,16 @@ def test_an_unfinished_upload_is_a_leftover_and_its_parts_are_given_back(remote,
     assert "cut off" in item.fault
     assert place(remote).remove(item)
     assert files.list_multipart_uploads("bucket") == []
+    assert looked(remote).keys() == {(CLIP, False)}
+
+
+def test_a_store_that_knows_no_open_uploads_may_say_so_as_it_likes(remote, monkeypatch):
+    compute(remote)
+
+    def call(self, method, **asked):
+        raise FileNotFoundError("NoSuchUpload")
+
+    monkeypatch.setattr(s3fs.S3FileSystem, "call_s3", call)
     assert looked(remote).keys() == {(CLIP, False)}
 
 
