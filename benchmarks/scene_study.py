@@ -186,7 +186,9 @@ def _prepare(scene: Scene, configuration: Configuration) -> Start:
     clip = extract_clip(scene, configuration.capture, needs)
     bodies, usual = given.meshes, configuration.repair
     if needed["location_search"]:
-        located = locate_body(clip, given, configuration.location)
+        search = configuration.location
+        forced = choose.location_search == "on"
+        located = locate_body(clip, given, search.where_asked_for() if forced else search)
         bodies = located.meshes
         usual = usual.after_search() if located.adopted else usual
     meshes, repair = repair_where_needed(

@@ -66,7 +66,9 @@ def prepare(request: Request) -> Preparation:
     clip = extract_clip(where, request.recording, chosen.capture, needs, turned)
     located = None
     if inspection.holds("location_search"):
-        located = locate_body(where, clip, given, chosen.location)
+        forced = chosen.plan.location_search == "on"
+        search = chosen.location.where_asked_for() if forced else chosen.location
+        located = locate_body(where, clip, given, search)
     bodies = located or given
     repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
     plan = plan_scene(

@@ -26,13 +26,17 @@ class LocatedMeshes:
 
     @property
     def quality(self) -> dict[str, float]:
-        """Median residual, median and least confidence over the frames that were searched."""
+        """Of the places found, whether or not they were adopted.
+
+        Median residual, median and least confidence over the frames that were searched.
+        """
         searched = np.isfinite(self.residual)
         sure = self.confidence[searched]
         return {
             "residual": float(np.median(self.residual[searched])),
             "confidence": float(np.median(sure)),
             "least_confidence": float(sure.min()),
+            "adopted": float(self.adopted),
         }
 
     def save(self, folder: Path) -> None:

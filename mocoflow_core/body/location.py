@@ -75,7 +75,12 @@ def locate_body(
     confidence = confidence * kept
     translations = path - centres
     adopted = not ingested.located or explains_more(
-        clip, searched, posed[rows], ingested.meshes.faces, residual[rows], configuration
+        clip,
+        searched,
+        posed[rows],
+        posed[rows] + translations[rows, None],
+        ingested.meshes.faces,
+        configuration,
     )
     if not adopted:
         translations = np.zeros_like(translations)

@@ -32,7 +32,10 @@ class LocationConfig(ConfigurationPart):
         4.0, ge=0, description="Confidence falls with this power of the share of the body in sight."
     )
     least_gain: float = Field(
-        0.5, ge=0, lt=1, description="Share of a given place's mismatch that another must take off."
+        0.5,
+        ge=0,
+        lt=1,
+        description="Share of a given place's mismatch that another must take off; 0: it is left.",
     )
     doubtful: float = Field(
         0.05, ge=0, lt=1, description="Frames of less confidence are told of in a warning."
@@ -44,3 +47,7 @@ class LocationConfig(ConfigurationPart):
     acceleration_m_s2: float = Field(
         4.0, gt=0, description="Usual acceleration of the body's centre, metres per square second."
     )
+
+    def where_asked_for(self) -> LocationConfig:
+        """For a search that was asked for by hand: what it finds is taken."""
+        return self.model_copy(update={"least_gain": 0.0})

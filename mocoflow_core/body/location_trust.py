@@ -41,22 +41,30 @@ def placement_confidence(
 def explains_more(
     clip: Clip,
     searched: NDArray[np.int64],
-    posed: Array,
+    given: Array,
+    found: Array,
     faces: NDArray[np.int32],
-    residual: Array,
     configuration: LocationConfig,
 ) -> bool:
     """Whether the places found leave much less of the masks unexplained than the given ones.
 
+    In the mean over the frames, so that a few that were given far off count.
+
     Args:
-        posed: (S, V, 3) the bodies of the frames ``searched`` (S,) where they were given.
-        residual: (S,) what the best placements leave.
+        given: (S, V, 3) the bodies of the frames ``searched`` (S,), in the camera's axes.
+        found: (S, V, 3) the same where they would stand.
     """
-    given = [
-        1 - crop_overlap(points, faces, grid_crop(clip.masks[position], clip, configuration))
-        for position, points in zip(searched, posed, strict=True)
-    ]
-    return float(np.median(residual)) < (1 - configuration.least_gain) * float(np.median(given))
+    if configuration.least_gain == 0:
+        return True
+    crops = [grid_crop(clip.masks[position], clip, configuration) for position in searched]
+
+    def unexplained(bodies: Array) -> float:
+        overlaps = [
+            crop_overlap(points, faces, crop) for points, crop in zip(bodies, crops, strict=True)
+        ]
+        return 1 - float(np.mean(overlaps))
+
+    return unexplained(found) < (1 - configuration.least_gain) * unexplained(given)
 
 
 def location_warnings(
@@ -90,8 +98,8 @@ def location_warnings(
         )
     if not adopted:
         return (
-            f"the given location stays: the best one overlaps the masks by {overlap:.2f} only, "
-            "so the poses are wrong rather than the place",
+            f"the given location stays, as others explain the masks hardly better (overlap of the "
+            f"best ones: {overlap:.2f}): the poses may be wrong rather than the place",
         )
     if overlap < configuration.least_overlap + 0.2:
         warnings.append(f"the located body overlaps the masks by {overlap:.2f} only")

@@ -56,6 +56,7 @@ class _Targets:
 
     weights: Tensor  # (T, M, P)
     places: Tensor  # (T, M, 3) world metres, before the correction
+    depth: Tensor  # (T, M, 1) of these, metres
     pixels: Tensor  # (T, M, 2)
     normals: Tensor  # (T, M, 2)
     share: Tensor  # (T, M)
@@ -126,19 +127,20 @@ class MaskMisfit:
                 [pixels, normals, np.full((count, 1), 1.0 / max(count, 1))], axis=1
             )
         pixels, normals, share = torch.from_numpy(targets).split((2, 2, 1), -1)
-        return _Targets(*correction.gather(self._rows, edges), pixels, normals, share[..., 0])
+        weights, places = correction.gather(self._rows, edges)
+        _, depth = project(self._camera, places)
+        return _Targets(weights, places, depth, pixels, normals, share[..., 0])
 
     def __call__(self, correction: JointCorrection, targets: _Targets, outlier_m: float) -> Tensor:
         """Minus the logarithm of how likely such distances are; beyond ``outlier_m`` saturated."""
         configuration = self._configuration
         world = blend(targets.weights, correction.transforms(self._rows), targets.places)
         pixels, depth = project(self._camera, world)
-        _, given_depth = project(self._camera, targets.places)
         focal = torch.from_numpy(np.diagonal(self._camera.K)[:2].copy()).float()
         # Lengths where the estimate stands: the same picture must cost the same near and far, or
         # small and near would seem likelier.
-        off = ((pixels - targets.pixels) / focal * given_depth * targets.normals).sum(-1)
-        nearer = (given_depth / depth)[..., 0]
+        off = ((pixels - targets.pixels) / focal * targets.depth * targets.normals).sum(-1)
+        nearer = (targets.depth / depth)[..., 0]
         off = off + nearer * correction.stand_off(targets.weights)
         squared = off * off
         robust = squared / (1.0 + squared / outlier_m**2)

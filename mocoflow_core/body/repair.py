@@ -47,15 +47,21 @@ class RepairConfig(ConfigurationPart):
     stiff_error_deg: float = Field(0.3, gt=0, description="The same where the mesh never bends.")
     root_error_m: float = Field(0.02, gt=0, description="Usual error of the body's place.")
     searched_error_m: float = Field(
-        0.12, gt=0, description="The same where the place was searched from the masks."
+        0.12, gt=0, description="The same, instead of it, where the place was searched."
     )
     size_error: float = Field(
         0.05, ge=0, description="Usual error of the body's size, as a share; 0: it is right."
     )
-    least_size_error: float = Field(
-        0.03, ge=0, description="Smaller ones than this may be errors of depth: the size is right."
+    searched_size_error: float = Field(
+        0.0, ge=0, description="The same, instead of it, where the place was searched."
     )
-    error_seconds: float = Field(0.5, gt=0, description="How long an error stays alike.")
+    least_size_error: float = Field(
+        0.03,
+        ge=0,
+        description="Smaller ones are taken for errors of depth before colours are fitted.",
+    )
+    # With 0.5 a dance keeps nearly twice the error, a slow turn a tenth less: estimate_repair.md.
+    error_seconds: float = Field(0.35, gt=0, description="How long an error stays alike.")
     clothes_m: float = Field(0.02, gt=0, description="Usual standing off of clothes from the mesh.")
     masks: MaskMisfitConfig = MaskMisfitConfig()
     colours: ColourMisfitConfig = ColourMisfitConfig()
@@ -67,7 +73,8 @@ class RepairConfig(ConfigurationPart):
 
         Such a place errs by more, and says nothing of the size.
         """
-        return self.model_copy(update={"root_error_m": self.searched_error_m, "size_error": 0.0})
+        errors = {"root_error_m": self.searched_error_m, "size_error": self.searched_size_error}
+        return self.model_copy(update=errors)
 
 
 def outlines_apart(clip: Clip, meshes: MeshSequence, configuration: RepairConfig) -> float:
@@ -118,8 +125,8 @@ def repair_body(
     # Sums over several threads differ in their last bit from run to run.
     with torch_threads(1):
         _fit_masks(correction, masks, configuration.by_masks, progress)
-        correction.doubt_size(configuration.least_size_error)
-        if configuration.colours.independent_points:
+        if configuration.colours.independent_points and configuration.by_both.rounds:
+            correction.doubt_size(configuration.least_size_error)
             _fit_both(correction, masks, colours, configuration.by_both, progress)
         with torch.no_grad():
             vertices = correction.vertices(np.arange(len(meshes.vertices)))

@@ -236,6 +236,22 @@ def test_a_trusted_place_is_left_where_another_explains_the_masks(masks):
     assert np.abs(located.meshes.vertices - MESHES.vertices).max() < 0.1
 
 
+def test_a_few_frames_that_were_given_far_off_are_moved(masks):
+    offsets = np.zeros((FRAMES, 1, 3))
+    offsets[[1, 3, 5]] = [0.6, 0.0, 0.0]
+    located = locate_body(clip_of(masks), given_in_world(IN_CAMERA + offsets), LocationConfig())
+    assert located.adopted
+    assert np.abs(located.meshes.vertices - MESHES.vertices).max() < 0.1
+
+
+def test_a_search_that_was_asked_for_by_hand_is_taken(masks):
+    given = given_in_world(IN_CAMERA + np.array([0.05, 0.0, 0.0]))
+    search = LocationConfig().where_asked_for()
+    located = locate_body(clip_of(masks), given, search)
+    assert located.adopted
+    assert np.abs(located.meshes.vertices - MESHES.vertices).max() < 0.1
+
+
 @pytest.mark.parametrize("distance", [2.0, 8.0, 40.0])
 def test_the_target_may_be_anywhere_before_the_camera(distance):
     camera = look_at([0, -distance, 1.0], [0, 0, 0.9], 50 * distance, 128, 128)

@@ -11,7 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from mocoflow_core.body.articulation import articulate
 from mocoflow_core.body.joint_correction import JointCorrection
-from mocoflow_core.body.mask_misfit import MaskMisfit, MaskMisfitConfig, expected_share
+from mocoflow_core.body.mask_misfit import (
+    MaskMisfit,
+    MaskMisfitConfig,
+    expected_share,
+    project,
+)
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.body.rasterise import interpolate, rasterise
 from mocoflow_core.body.repair import RepairConfig, RoundsConfig, outlines_apart, repair_body
@@ -188,6 +193,27 @@ def test_what_gives_the_same_picture_costs_the_same_near_and_far(
     # Sums of float32 over a thousand points.
     moved = masks(correction, targets, 0.08)
     assert moved.item() == pytest.approx(given.item(), rel=1e-4)
+
+
+def test_clothes_move_an_outline_by_less_the_farther_away_they_are(truth: MeshSequence) -> None:
+    rows = np.arange(FRAMES)
+    masks = MaskMisfit(filmed(truth), rows, rows, truth.faces, CONFIGURATION.masks)
+    skeleton = articulate(truth.vertices, truth.faces, parts=6, blend_m=0.04)
+    usual = np.full(len(skeleton.parents), 0.1)
+    correction = JointCorrection(skeleton, truth.vertices, np.eye(FRAMES), usual, 1.0, 1.0, 0.02)
+    targets = masks.look(correction)
+    on_the_masks = replace(targets, pixels=project(camera(), targets.places)[0])
+    away = camera().centre_world - skeleton.pivots[:, 0]
+    with torch.no_grad():
+        correction.clothes.fill_(1.0)
+        # The same picture from twice as far: 2 cm of clothes show like 1 cm on the estimate.
+        correction.size.fill_(np.log(2.0))
+        correction.shifts.copy_(torch.from_numpy(-away))
+    usual_misfit = 0.5 * CONFIGURATION.masks.independent_points / 0.02**2
+    # Of every point, as their shares of a frame sum to one; 0.08 m saturate far beyond it.
+    expected = usual_misfit * len(rows) * 0.01**2 / (1 + (0.01 / 0.08) ** 2)
+    found = masks(correction, on_the_masks, 0.08)
+    assert found.item() == pytest.approx(expected, rel=0.01)
 
 
 def test_where_no_error_is_expected_the_estimate_is_left_as_it_came(
