@@ -8,7 +8,6 @@ whatever else the machine does.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,12 +23,7 @@ from mocoflow_core.capture.scene import Scene
 from mocoflow_core.estimators.ingest import ingest_meshes
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.scene_shape import SceneShape
-from mocoflow_core.methods.rendered_views import (
-    Renderer,
-    ScoredView,
-    TrainedRenderer,
-    scored_views,
-)
+from mocoflow_core.methods.rendered_views import ScoredView, TrainedRenderer, scored_views
 from mocoflow_core.methods.scored_views import (
     Moment,
     Subject,
@@ -93,31 +87,14 @@ class PreparedScene:
 
     def curve(self, configuration: Configuration, seed: int, method: str) -> list[CurveRow]:
         """Optimise as the plan says and score every snapshot, on the whole training clock."""
-        return self.curves(configuration, seed, method, [lambda renderer: renderer])[0]
-
-    def curves(
-        self,
-        configuration: Configuration,
-        seed: int,
-        method: str,
-        glasses: Sequence[Callable[[Renderer], Renderer]],
-    ) -> list[list[CurveRow]]:
-        """One optimisation's curve as seen through each of several glasses."""
-        subject = Subject(self.name, seed)
         with TemporaryDirectory() as name:
             folder = Path(name)
             self._optimise(configuration, seed, folder)
             moments = [self._moment(folder, s, method) for s in read_snapshots(folder)]
-            return [
-                error_curve(
-                    subject,
-                    [moment._replace(renderer=glass(moment.renderer)) for moment in moments],
-                    self._views,
-                    configuration.evaluation,
-                    lambda share, text: None,
-                )
-                for glass in glasses
-            ]
+            subject = Subject(self.name, seed)
+            return error_curve(
+                subject, moments, self._views, configuration.evaluation, lambda share, text: None
+            )
 
     def _moment(self, folder: Path, snapshot: Snapshot, method: str) -> Moment:
         opened = TrainedScene.open(folder, snapshot_weights(folder, snapshot))
