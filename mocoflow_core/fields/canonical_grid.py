@@ -22,7 +22,7 @@ from mocoflow_core.geometry.grid import SparseGrids, weighted_rows
 class CanonicalConfig(ConfigurationPart):
     """Sizes of the canonical field."""
 
-    # 10 and 7 mm cost more and show less at unseen views: benchmarks/work_precision.md.
+    # 10 and 7 mm cost more and show no more at unseen views: benchmarks/work_precision.md.
     finest_m: float = Field(0.014, gt=0, description="cell of the finest level, metres")
     level_ratio: float = Field(2.8, gt=1, description="cell size from one level to the next")
     levels: int = Field(3, ge=1)

@@ -21,7 +21,7 @@ class ScheduleConfig(ConfigurationPart):
     )
     last_bands: float = Field(1.0, ge=0, le=1, description="share of bands that are on at last")
     # Half the rays at twice the rates, with cells of 14 mm instead of 10, reach the error of before
-    # in two thirds of the time: benchmarks/work_precision.md.
+    # in two thirds of the time: benchmarks/work-precision-2026-11-24/.
     rays: int = Field(384, ge=1, description="rays of one step")
     frames_per_step: int = Field(4, ge=1, description="frames that the rays of a step come from")
     rate_features: float = Field(4e-2, gt=0, description="feature grids")
