@@ -26,17 +26,15 @@ class Setting(NamedTuple):
 
 
 class Knob(NamedTuple):
-    """Settings of one kind, cheap ones first, and those of them that a quick study measures."""
+    """Settings of one kind, cheap ones first, and those of them that are usually measured."""
 
     name: str
     settings: tuple[Setting, ...]
-    quick: tuple[str, ...]  # values
+    usual: tuple[str, ...]  # values
 
-    def chosen(self, quick: bool) -> list[Setting]:
+    def chosen(self, whole: bool) -> list[Setting]:
         """What is measured, apart from the defaults."""
-        return [
-            s for s in self.settings if not s.is_default and (not quick or s.value in self.quick)
-        ]
+        return [s for s in self.settings if not s.is_default and (whole or s.value in self.usual)]
 
 
 def _steps(count: int) -> Setting:

@@ -1,6 +1,6 @@
 """Work against precision: what each knob of the default preset costs, and the error it yields.
 
-    python -m benchmarks.work_precision [--quick] [--keep] [--out FOLDER]
+    python -m benchmarks.work_precision [--whole] [--keep] [--out FOLDER]
 
 Every knob alone around the defaults, the best of them together, and the defaults under budgets; on
 small synthetic scenes, one thread, CPU seconds of the training clock, PSNR over the person and
@@ -46,21 +46,21 @@ class Extent(NamedTuple):
     joined: int  # the best two settings of different knobs together, and so on to so many
 
 
-QUICK = Extent(
+USUAL = Extent(
     ("turn,frames=24", "dance_noise6,frames=24", "turn_loose,frames=24"), range(1), range(2), 3
 )
-FULL = Extent((*QUICK.scenes, "spin,frames=24"), range(2), range(3), 4)
+WHOLE = Extent((*USUAL.scenes, "spin,frames=24"), range(2), range(3), 4)
 
 
 def main() -> None:
     arguments = _arguments()
-    extent = QUICK if arguments.quick else FULL
+    extent = WHOLE if arguments.whole else USUAL
     table = arguments.out / "work_precision.csv"
     rows = read_rows(table) if arguments.keep and table.exists() else []
     torch.set_num_threads(1)
     with TemporaryDirectory() as folder:
         study = Study(extent.scenes, rows, table, Path(folder))
-        sweep = [s for knob in KNOBS for s in knob.chosen(arguments.quick)]
+        sweep = [s for knob in KNOBS for s in knob.chosen(arguments.whole)]
         study.measure([DEFAULT, *sweep], extent.sweep_seeds)
         best = _best_of_each_knob(sweep, study.rows, extent)
         joined = [together(tuple(best[:count])) for count in range(2, len(best) + 1)]
@@ -73,7 +73,7 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="fewer values, scenes and seeds")
+    parser.add_argument("--whole", action="store_true", help="more values, scenes and seeds")
     parser.add_argument("--keep", action="store_true", help="go on from the table in the folder")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="of all results")
     return parser.parse_args()

@@ -31,7 +31,7 @@ def test_the_sweep_of_a_knob_goes_through_the_defaults_on_both_sides_or_from_one
     defaults = [setting.is_default for setting in knob.settings]
     assert sum(defaults) == 1
     assert len(knob.settings) >= 2
-    assert set(knob.quick) <= {setting.value for setting in knob.chosen(quick=False)}
+    assert set(knob.usual) <= {setting.value for setting in knob.chosen(whole=True)}
 
 
 def test_settings_together_change_what_each_changes_alone():
