@@ -84,6 +84,11 @@ def location_warnings(
     """
     searched = np.isfinite(residual)
     overlap = 1 - float(np.median(residual[searched]))
+    if not adopted:
+        return (
+            f"the given location stays, as others explain the masks hardly better (overlap of the "
+            f"best ones: {overlap:.2f}): the poses may be wrong rather than the place",
+        )
     doubtful = numbers[searched & (confidence <= configuration.doubtful)]
     warnings = []
     if len(cut):
@@ -95,11 +100,6 @@ def location_warnings(
         warnings.append(
             f"{len(doubtful)} of {searched.sum()} masks fit badly or disagree with the frames "
             f"around ({listed(doubtful.tolist())}): the location there follows its neighbours"
-        )
-    if not adopted:
-        return (
-            f"the given location stays, as others explain the masks hardly better (overlap of the "
-            f"best ones: {overlap:.2f}): the poses may be wrong rather than the place",
         )
     if overlap < configuration.least_overlap + 0.2:
         warnings.append(f"the located body overlaps the masks by {overlap:.2f} only")

@@ -104,10 +104,10 @@ def repair_body(
 
     The correction is the likeliest one: each joint errs by a few degrees, smoothly in time, the
     whole body is too large or too small by a few percent, clothes stand off by a distance of each
-    part's own. First the outlines are
-    laid onto the masks, then the colour of each point of the skin must stay the same as well.
-    Held-out frames, which are not looked at, and frames between get the correction of the moment.
-    Where no error is expected, or no mask shows anybody, the meshes come back as they were.
+    part's own. First the outlines are laid onto the masks, and a size that is found wrong by next
+    to nothing is taken for right; then the colour of each point of the skin must stay the same as
+    well. Held-out frames, which are not looked at, and frames between get the correction of the
+    moment. Where no error is expected, or no mask shows anybody, the meshes come back as they were.
 
     Args:
         clip: of the camera trained on.
