@@ -9,34 +9,23 @@ from typing import Annotated
 
 import typer
 
+from flows.benchmark_command import benchmark
+from flows.bounds import MONTH_S
 from flows.finished_run import export, render
 from flows.import_dataset import import_dataset
 from flows.list_options import ListOptions
 from flows.prefect_settings import set_environment, undisturbed
+from flows.scene_options import (
+    BODY_MODEL_HELP,
+    MESHES_HELP,
+    PERSON_HELP,
+    PRESET_HELP,
+    SCENE_HELP,
+    Seed,
+)
 from flows.store_commands import store_app
 from flows.video_options import Clip, Focal, is_bare_video, video_settings
-from flows.worker_options import CellWorkers, DaskAddress, Slots
 from mocoflow_core.errors import InputError
-
-# Written out: presets and experiments themselves take torch, which takes a second.
-EXPERIMENT_HELP = (
-    "removal, progressive, misalignment, partial_observation, train_camera or worse_estimate: "
-    "scenes, methods and presets of the paper's, where they are not given."
-)
-SCENE_HELP = "Folder with a scene.json, or of a data set (see docs/datasets), or a video file."
-MESHES_HELP = (
-    "Body meshes to use instead: a file or folder of VIBE, PARE, WHAM, PHALP, 4D-Humans, GVHMR, "
-    "TRAM, ROMP, BEV, AIST++ or EasyMocap, a folder of OBJ, PLY or GLB, or a meshes.npz."
-)
-PERSON_HELP = (
-    "Id of the person among those of --meshes, by default the longest track; of a bare video its "
-    "number, by default the only large one."
-)
-BODY_MODEL_HELP = "SMPL or SMPL-X model file, or a folder of them, where the meshes need one."
-# The bounds of flows/parameters.py.
-MONTH_S = 31 * 24 * 3600.0
-Seed = typer.Option(help="Of everything random.", min=0, max=2**32 - 1)
-PRESET_HELP = "fast, toy, paper, paper_aist, paper_zju_mocap or paper_small."
 
 app = typer.Typer(
     help="A moving person, filmed by one fixed camera, seen from any side at any time.",
@@ -192,87 +181,9 @@ def _said(
     return [*(settings or ()), *own]
 
 
-@app.command(cls=ListOptions)
-def benchmark(
-    out: Annotated[Path, typer.Option(help="New folder for the results.")],
-    experiment: Annotated[str | None, typer.Option(help=EXPERIMENT_HELP)] = None,
-    scenes: Annotated[
-        list[str] | None,
-        typer.Option(metavar="SCENE...", help="Folders, or synthetic scenes by name; @CAMERA."),
-    ] = None,
-    methods: Annotated[
-        list[str] | None,
-        typer.Option(metavar="METHOD...", help="mocoflow, posed_mesh, without_consensus, ..."),
-    ] = None,
-    presets: Annotated[
-        list[str] | None, typer.Option(metavar="PRESET...", help=PRESET_HELP)
-    ] = None,
-    seeds: Annotated[int, typer.Option(help="How many seeds, from 0.", min=1, max=100)] = 3,
-    budget: Annotated[
-        float | None,
-        typer.Option(help="Seconds of the training clock of each run.", min=1.0, max=MONTH_S),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="FIELD=VALUE...", help="Fields of the configuration."),
-    ] = None,
-    targets: Annotated[
-        list[str] | None,
-        typer.Option(metavar="METRIC=VALUE...", help="Scores to be reached, as psnr_union=20."),
-    ] = None,
-    store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
-    workers: Annotated[int, CellWorkers] = 1,
-    dask: Annotated[str | None, DaskAddress] = None,
-    slots: Annotated[str | None, Slots] = None,
-) -> None:
-    """Compare methods and presets on several scenes: error against run time."""
-    from flows.benchmark_request import BenchmarkRequest
-
-    request = BenchmarkRequest(
-        experiment=experiment,
-        scenes=tuple(scenes) if scenes else None,
-        out=out,
-        methods=tuple(methods) if methods else None,
-        presets=tuple(presets) if presets else None,
-        seeds=seeds,
-        budget_s=budget,
-        settings=tuple(settings or ()),
-        targets=tuple(targets or ()),
-        store_url=store,
-        workers=workers,
-        dask=dask,
-        slots=slots,
-    )
-    request.claim()
-    set_environment()
-    from flows.benchmark import benchmark as flow
-
-    with undisturbed():
-        record = flow(
-            out=request.out,
-            experiment=request.experiment,
-            scenes=request.scenes,
-            methods=request.methods,
-            presets=request.presets,
-            seeds=request.seeds,
-            budget_s=request.budget_s,
-            settings=request.settings,
-            targets=request.targets,
-            store=request.store_url,
-            workers=request.workers,
-            dask=request.dask,
-            slots=request.slots,
-        )
-    for cell in record.cells:
-        if cell.state != "finished":
-            typer.echo(f"{cell.name} {cell.state}: {cell.reason}", err=True)
-    typer.echo(f"Benchmark: {request.place / 'benchmark.html'}")
-    if record.cells and not any(cell.state == "finished" for cell in record.cells):
-        sys.exit(1)
-
-
 app.add_typer(store_app, name="store")
 app.command("import")(import_dataset)
+app.command(cls=ListOptions)(benchmark)
 app.command()(render)
 app.command()(export)
 

@@ -6,9 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-# Random generators take 32 bits everywhere.
-HIGHEST_SEED = 2**32 - 1
-MONTH_S = 31 * 24 * 3600.0
+from flows.bounds import HIGHEST_SEED, MONTH_S
 
 Seed = Annotated[int, Field(ge=0, le=HIGHEST_SEED)]
 Seeds = Annotated[int, Field(ge=1, le=100)]
