@@ -9,7 +9,7 @@ from mocoflow_core.body.location_config import LocationConfig
 from mocoflow_core.capture.clip import Clip
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # A given location stays where another explains the masks hardly better.
+ALGORITHM_VERSION = 5  # Tells how badly the given location explained the masks.
 
 
 @stage(LocationArtifact, ALGORITHM_VERSION)

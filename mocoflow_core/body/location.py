@@ -6,6 +6,7 @@ time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -19,10 +20,10 @@ from mocoflow_core.body.located_meshes import LocatedMeshes
 from mocoflow_core.body.location_config import LocationConfig
 from mocoflow_core.body.location_trust import (
     crop_overlap,
-    explains_more,
     grid_crop,
     location_warnings,
     placement_confidence,
+    unexplained,
 )
 from mocoflow_core.body.mask_crop import MaskCrop, facing
 from mocoflow_core.body.outline_fit import fit_outline
@@ -74,14 +75,13 @@ def locate_body(
     path, kept = _smooth(clip, numbers, found, confidence, configuration)
     confidence = confidence * kept
     translations = path - centres
-    adopted = not ingested.located or explains_more(
-        clip,
-        searched,
-        posed[rows],
-        posed[rows] + translations[rows, None],
-        ingested.meshes.faces,
-        configuration,
-    )
+
+    def mismatch(bodies: Array) -> float:
+        return unexplained(clip, searched, bodies, ingested.meshes.faces, configuration)
+
+    reached = mismatch(posed[rows] + translations[rows, None])
+    given = mismatch(posed[rows]) if ingested.located else math.inf
+    adopted = configuration.least_gain == 0 or reached < (1 - configuration.least_gain) * given
     if not adopted:
         translations = np.zeros_like(translations)
     world = clip.camera.to_world(posed + translations[:, None])
@@ -91,6 +91,8 @@ def locate_body(
         translations,
         residual,
         confidence,
+        reached,
+        given,
         adopted,
         location_warnings(numbers, cut, residual, confidence, adopted, configuration),
     )

@@ -38,33 +38,25 @@ def placement_confidence(
     return trust * in_sight**configuration.cut_power
 
 
-def explains_more(
+def unexplained(
     clip: Clip,
     searched: NDArray[np.int64],
-    given: Array,
-    found: Array,
+    bodies: Array,
     faces: NDArray[np.int32],
     configuration: LocationConfig,
-) -> bool:
-    """Whether the places found leave much less of the masks unexplained than the given ones.
+) -> float:
+    """Mean share of the masks and bodies together where only one of both is.
 
-    In the mean over the frames, so that a few that were given far off count.
+    In the mean over the frames, so that a few that are far off count.
 
     Args:
-        given: (S, V, 3) the bodies of the frames ``searched`` (S,), in the camera's axes.
-        found: (S, V, 3) the same where they would stand.
+        bodies: (S, V, 3) of the frames ``searched`` (S,), in the camera's axes.
     """
-    if configuration.least_gain == 0:
-        return True
-    crops = [grid_crop(clip.masks[position], clip, configuration) for position in searched]
-
-    def unexplained(bodies: Array) -> float:
-        overlaps = [
-            crop_overlap(points, faces, crop) for points, crop in zip(bodies, crops, strict=True)
-        ]
-        return 1 - float(np.mean(overlaps))
-
-    return unexplained(found) < (1 - configuration.least_gain) * unexplained(given)
+    overlaps = [
+        crop_overlap(points, faces, grid_crop(clip.masks[position], clip, configuration))
+        for position, points in zip(searched.tolist(), bodies, strict=True)
+    ]
+    return 1 - float(np.mean(overlaps))
 
 
 def location_warnings(

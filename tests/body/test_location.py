@@ -223,6 +223,7 @@ def test_a_trusted_place_stays_where_the_poses_are_wrong(masks):
     given = given_in_world((IN_CAMERA - centres) @ bow.T + centres)
     located = locate_body(clip_of(masks), given, LocationConfig())
     assert not located.adopted
+    assert located.given_mismatch < 2 * located.mismatch
     np.testing.assert_array_equal(located.translations, 0)
     assert np.abs(located.meshes.vertices - given.meshes.vertices).max() < 1e-6
     [warning] = located.warnings
@@ -233,6 +234,7 @@ def test_a_trusted_place_is_left_where_another_explains_the_masks(masks):
     given = given_in_world(IN_CAMERA + np.array([0.4, 0.1, 0.3]))
     located = locate_body(clip_of(masks), given, LocationConfig())
     assert located.adopted
+    assert located.quality["given_mismatch"] > 2 * located.quality["mismatch"]
     assert np.abs(located.meshes.vertices - MESHES.vertices).max() < 0.1
 
 
