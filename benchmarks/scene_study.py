@@ -8,7 +8,6 @@ whatever else the machine does.
 from __future__ import annotations
 
 import time
-from dataclasses import astuple
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -100,7 +99,7 @@ class PreparedScene:
         opened = TrainedScene.open(folder, snapshot_weights(folder, snapshot))
         seconds = self.spent + Seconds(snapshot.wall_s, snapshot.cpu_s)
         renderer = TrainedRenderer(opened, self.clip)
-        return Moment(method, "optimise_scene", snapshot.step, *astuple(seconds), renderer)
+        return Moment(method, "optimise_scene", snapshot.step, seconds.wall, seconds.cpu, renderer)
 
     def _optimise(
         self, configuration: Configuration, seed: int, folder: Path
@@ -163,9 +162,7 @@ def _prepare(scene: Scene, configuration: Configuration) -> Start:
     clip = extract_clip(scene, configuration.capture, needs)
     bodies, usual = given.meshes, configuration.repair
     if needed["location_search"]:
-        search = configuration.location
-        forced = choose.location_search == "on"
-        located = locate_body(clip, given, search.where_asked_for() if forced else search)
+        located = locate_body(clip, given, configuration.location_search)
         bodies = located.meshes
         usual = usual.after_search() if located.adopted else usual
     meshes, repair = repair_where_needed(

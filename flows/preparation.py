@@ -66,9 +66,7 @@ def prepare(request: Request) -> Preparation:
     clip = extract_clip(where, request.recording, chosen.capture, needs, turned)
     located = None
     if inspection.holds("location_search"):
-        forced = chosen.plan.location_search == "on"
-        search = chosen.location.where_asked_for() if forced else chosen.location
-        located = locate_body(where, clip, given, search)
+        located = locate_body(where, clip, given, chosen.location_search)
     bodies = located or given
     repaired = repair_body(where, clip, bodies, chosen.repair, chosen.plan.body_repair)
     plan = plan_scene(

@@ -54,6 +54,12 @@ class Configuration(ConfigurationPart):
     truth: TruthConfig = TruthConfig()
     presentation: PresentationConfig = PresentationConfig()
 
+    @property
+    def location_search(self) -> LocationConfig:
+        """How the location is searched; a search asked for by hand takes what it finds."""
+        asked_for = self.plan.location_search == "on"
+        return self.location.where_asked_for() if asked_for else self.location
+
 
 def fast() -> Configuration:
     """Two CPU cores, a minute: the default."""
