@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mocoflow_core.capture.scene import Scene, open_scene
 from mocoflow_core.datasets.bare_video import usable_frames
+from mocoflow_core.io.pictures import read_picture
 from mocoflow_core.io.video_facts import read_video_facts
 from mocoflow_core.perception.blazepose import BlazePose
 from mocoflow_core.video.camera_check import require_still_camera
@@ -40,8 +41,8 @@ def mask_overlaps(
     for row, number in enumerate(frames.numbers.tolist()):
         if number not in given:
             continue
-        truth = cv2.imread(str(given[number]), cv2.IMREAD_GRAYSCALE)
-        truth = cv2.resize(truth, (width, height), interpolation=cv2.INTER_AREA) > 127
+        picture = read_picture(given[number])
+        truth = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA) > 127
         alone = person.poses[row].mask(height, width) > 0.5
         for name, mask in (("final", masks.at(row)), ("network alone", alone)):
             overlaps[name].append((mask & truth).sum() / (mask | truth).sum())

@@ -17,6 +17,7 @@ from mocoflow_core.body.fit.landmark_misfit import project
 from mocoflow_core.body.fit.sightings import Sightings
 from mocoflow_core.geometry.nearest_rotation import rotation_by_svd
 from mocoflow_core.perception.blazepose import PRESENT, BlazePose
+from mocoflow_core.perception.person import BodyLandmarks
 from mocoflow_core.synthetic.background import render_background
 from mocoflow_core.synthetic.body_shape import BodyShape
 from mocoflow_core.synthetic.camera_ring import camera_ring
@@ -76,7 +77,7 @@ def looks(body: FittableBody) -> Iterator[Look]:
                     yield look(body, camera.to_camera(vertices), camera.K, found.landmarks)
 
 
-def look(body: FittableBody, vertices: Array, K: Array, landmarks: object) -> Look:
+def look(body: FittableBody, vertices: Array, K: Array, landmarks: BodyLandmarks) -> Look:
     sightings = Sightings.of(
         landmarks.places[None], landmarks.visibility[None], landmarks.world[None]
     )
@@ -140,6 +141,7 @@ def errors(seen: list[Look], table: Array) -> str:
     hips = [LANDMARKS.index("left_hip"), LANDMARKS.index("right_hip")]
     picture, space = [], []
     for s in seen:
+        assert s.sightings.world is not None  # BlazePose always gives them.
         moved = (s.turns @ table[:, :, None])[..., 0]
         left = s.off - (s.slopes @ moved[..., None])[..., 0]
         picture.append(1e3 * s.metres * np.linalg.norm(left, axis=1))

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -36,6 +38,7 @@ from mocoflow_core.training.batches import Batch, TrainingPixels
 from mocoflow_core.training.network_objective import NetworkObjective
 from mocoflow_core.training.network_stages import network_space
 
+Step = Callable[[torch.Generator], dict[str, Tensor]]
 _FIT_STEPS, _FIT_POINTS = 300, 2048
 
 
@@ -54,14 +57,14 @@ def main() -> None:
     times = torch.from_numpy(clip.times[~clip.held_out])
     boxes = space.boxes.at(times)
     samples = (chosen.box.coarse_samples, chosen.box.fine_samples)
-    ours, plain = (kind(field, boxes, *samples) for kind in (BoxScene, PlainBoxScene))
+    ours, plain = BoxScene(field, boxes, *samples), PlainBoxScene(field, boxes, *samples)
     pixels = TrainingPixels(clip, ours)
     rows = []
     for name, hits_alone in (("all rays meet the box", True), ("rays of the whole image", False)):
         batch = _batch(pixels, chosen.schedule.rays, hits_alone)
         objective = NetworkObjective(ours, chosen.losses, consensus=True)
-        slow = _measure(field, lambda g, b=batch: plain_losses(plain, chosen.losses, b, g), 1)
-        fast = _measure(field, lambda g, b=batch, o=objective: o(b, g), arguments.steps)
+        slow = _measure(field, partial(plain_losses, plain, chosen.losses, batch), 1)
+        fast = _measure(field, partial(objective, batch), arguments.steps)
         rows.append(_row(name, slow, fast))
         print(rows[-1], flush=True)
     text = _document(rows, arguments, describe_machine())
@@ -121,12 +124,12 @@ def _batch(pixels: TrainingPixels, rays: int, hits_alone: bool) -> Batch:
     return replace(batch, rays=batch.rays.select(rows), **parts)
 
 
-def _measure(field: NetworkField, step, steps: int) -> Measured:  # noqa: ANN001
+def _measure(field: NetworkField, step: Step, steps: int) -> Measured:
     optimiser = torch.optim.Adam(field.parameters(), lr=0.0, fused=True)
     seconds, losses = [], {}
     for _ in range(steps):
         start = time.process_time()
-        terms: dict[str, Tensor] = step(torch.Generator().manual_seed(1))
+        terms = step(torch.Generator().manual_seed(1))
         optimiser.zero_grad()
         torch.stack(list(terms.values())).sum().backward()
         optimiser.step()

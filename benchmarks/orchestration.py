@@ -74,8 +74,17 @@ class Surroundings:
         """What they have cost so far."""
         cpu_s = sum(_cpu_s(pid) for pid in self.processes)
         rows, size = _database(self.database) if self.database else (0, 0)
-        passed = (self.traffic.requests.total(), self.traffic.up_bytes, self.traffic.down_bytes)
-        return Cost(cpu_s, time.monotonic(), cpu_s, *map(float, passed), float(rows), float(size))
+        passed = self.traffic
+        return Cost(
+            cpu_s=cpu_s,
+            wall_s=time.monotonic(),
+            around_cpu_s=cpu_s,
+            requests=float(passed.requests.total()),
+            up_bytes=float(passed.up_bytes),
+            down_bytes=float(passed.down_bytes),
+            rows=float(rows),
+            database_bytes=float(size),
+        )
 
 
 def main() -> None:

@@ -45,7 +45,7 @@ class Square(NamedTuple):
         if not mask.any():
             return Seen(None, np.full((self.side, self.side, 3), 255, np.uint8))
         crop = crop_around(mask, self.side)
-        return Seen(crop, as_bytes(crop.of(rgb, WHITE)))  # type: ignore[arg-type]
+        return Seen(crop, as_bytes(crop.of(rgb, WHITE)))
 
 
 class Seen(NamedTuple):

@@ -43,7 +43,7 @@ class Cut(NamedTuple):
 
     def of(self, rgb: NDArray[np.floating]) -> Picture:
         """The same cut of a render (H, W, 3) over white."""
-        return as_bytes(self.crop.of(rgb, WHITE))  # type: ignore[arg-type]
+        return as_bytes(self.crop.of(rgb, WHITE))
 
 
 def network_rows(
@@ -70,7 +70,7 @@ def cut_of(view: ScoredView, side: int) -> Cut:
     mask = np.asarray(view.clip.masks[view.row])
     crop = crop_around(mask, side)
     white = on_white(np.asarray(view.clip.frames[view.row]), mask)
-    return Cut(view, crop, as_bytes(crop.of(white, WHITE)), float(mask.sum()))  # type: ignore[arg-type]
+    return Cut(view, crop, as_bytes(crop.of(white, WHITE)), float(mask.sum()))
 
 
 def lpips_rows(

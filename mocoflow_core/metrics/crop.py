@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.metrics.ssim import WINDOW_PX
+
+Pixel = TypeVar("Pixel", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class Crop:
     left: int
     side: int
 
-    def of(self, image: NDArray[np.generic], outside: float | bool) -> NDArray[np.generic]:
+    def of(self, image: NDArray[Pixel], outside: float | bool) -> NDArray[Pixel]:
         """The square of an image (H, W, ...); pixels beyond the border are ``outside``."""
         height, width = image.shape[:2]
         square = np.full((self.side, self.side, *image.shape[2:]), outside, image.dtype)

@@ -162,7 +162,7 @@ def _scores(truth: Image, mask: Mask, move: NDArray[np.float64], side: int) -> d
     crop = crop_around(mask, side)
     ours, theirs = crop.of(moved, WHITE), crop.of(truth, WHITE)
     return {
-        "psnr": psnr(ours, theirs),  # type: ignore[arg-type]
-        "ssim": ssim(ours, theirs),  # type: ignore[arg-type]
+        "psnr": psnr(ours, theirs),
+        "ssim": ssim(ours, theirs),
         "psnr_union": psnr(moved, truth, covered | mask),
     }

@@ -81,7 +81,7 @@ def _scores(
     truth, crop = on_white(rgb, mask), crop_around(mask, side)
     judge, lpips = networks
     pictures = [
-        as_bytes(crop.of(picture, WHITE))  # type: ignore[arg-type]
+        as_bytes(crop.of(picture, WHITE))
         for picture in (truth, *(moved_picture(truth, m) for m in moves(misplacement, mask, scale)))
     ]
     reference, *sights = judge.look(pictures)

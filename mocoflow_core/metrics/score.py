@@ -115,9 +115,9 @@ def score_view(
     rendered_mask = rendered_opacity > configuration.opacity_threshold
     rendered_crop, truth_crop = crop.of(rendered_rgb, WHITE), crop.of(truth, WHITE)
     return {
-        "psnr": psnr(rendered_crop, truth_crop),  # type: ignore[arg-type]
+        "psnr": psnr(rendered_crop, truth_crop),
         "psnr_union": psnr(rendered_rgb, truth, rendered_mask | truth_mask),
         "psnr_image": psnr(rendered_rgb, truth),
-        "ssim": ssim(rendered_crop, truth_crop),  # type: ignore[arg-type]
+        "ssim": ssim(rendered_crop, truth_crop),
         "mask_iou": mask_iou(rendered_mask, truth_mask),
     }

@@ -72,7 +72,7 @@ def _window(picture: Picture, box: tuple[int, int, int, int], size: tuple[int, i
     row, column = (box[0] + box[2] - side) // 2, (box[1] + box[3] - side) // 2
     square = Crop(row, column, side).of(picture, 255)
     top, left = (side - size[0]) // 2, (side - size[1]) // 2
-    return square[top : top + size[0], left : left + size[1]]  # type: ignore[return-value]
+    return square[top : top + size[0], left : left + size[1]]
 
 
 def webp(picture: Picture) -> bytes:
