@@ -9,10 +9,12 @@ from prefect import flow
 
 from flows.benchmark_request import BenchmarkRequest
 from flows.parameters import Budget, Seeds, Setting
+from flows.regression_event import tell_of_regressions
 from flows.results_folders import folder_of_this_run
 from flows.run_cells import run_cells
 from flows.run_facts import show_benchmark_in_prefect
 from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
+from mocoflow_core.methods.past_benchmarks import past_nights
 from mocoflow_core.presets import Preset
 from tasks.collect_cells import collect_cells
 from tasks.misplace_views import misplace_views
@@ -21,6 +23,10 @@ from tasks.write_benchmark import write_benchmark
 
 TABLES = ("scores.parquet", "error_curve.parquet")
 COLLECTED = (*TABLES, "time_to_target.parquet", "misalignment.parquet")
+
+
+class NothingFinished(RuntimeError):
+    """There is nothing to compare; the page says why each run did not finish."""
 
 
 @flow(name="benchmark", validate_parameters=True)
@@ -35,6 +41,7 @@ def benchmark(
     settings: tuple[Setting, ...] = (),
     targets: tuple[str, ...] = (),
     store: str | None = None,
+    afresh: bool = False,
     workers: int = 1,
     dask: str | None = None,
     slots: str | None = None,
@@ -62,11 +69,17 @@ def benchmark(
         settings: single fields for all cells, such as ``schedule.fine_steps=200``.
         targets: scores to be reached, such as ``psnr_union=20``.
         store: folder or fsspec address of the artifact store.
+        afresh: measure everything again, in a store within ``out``, instead of taking what earlier
+            runs have made; what a comparison over nights needs.
         workers: processes of this machine that run cells at once, each with its share of the cores.
         dask: address of a Dask scheduler whose workers run the cells; they read and write the same
             paths as this process.
         slots: what each running cell holds one of: a resource of the Dask workers, else a global
             concurrency limit of the Prefect server.
+
+    Raises:
+        InputError: what no cell could run with.
+        NothingFinished: after everything is written.
     """
     request = BenchmarkRequest(
         experiment=experiment,
@@ -79,6 +92,7 @@ def benchmark(
         settings=settings,
         targets=targets,
         store_url=store,
+        afresh=afresh,
         workers=workers,
         dask=dask,
         slots=slots,
@@ -94,11 +108,12 @@ def benchmark(
     tables = collect_cells(
         where, files, records, list(request.methods), request.waited_for, misplaced_rows(request)
     )
-    page = write_benchmark(where, tables, records, request.command, request.experiment)
+    past = [row._asdict() for row in past_nights(folder.path, folder.begun)]
+    page = write_benchmark(where, tables, records, request.command, request.experiment, past)
 
     for name in COLLECTED:
         folder.take(where.folder(tables) / name, name)
-    for name in ("benchmark.html", "table.md"):
+    for name in ("benchmark.html", "table.md", "history.parquet"):
         folder.take(where.folder(page) / name, name)
     chart = where.folder(page) / "error_against_time.png"
     if done:
@@ -106,6 +121,9 @@ def benchmark(
     found = {name: tuple(values) for name, values in page.summary.items()}
     record = folder.finish({"cells": cells, **found})
     show_benchmark_in_prefect(record, folder.path / "benchmark.html", chart)
+    tell_of_regressions(record, folder.path / "benchmark.html")
+    if cells and not done:
+        raise NothingFinished(f"none of {len(cells)} runs finished: {folder.path}/benchmark.html")
     return record
 
 

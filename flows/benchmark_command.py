@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -48,6 +49,9 @@ def benchmark(
         typer.Option(metavar="METRIC=VALUE...", help="Scores to be reached, as psnr_union=20."),
     ] = None,
     store: Annotated[str | None, typer.Option(help="Folder or address of the store.")] = None,
+    afresh: Annotated[
+        bool, typer.Option("--afresh", help="Measure all again, in a store within --out.")
+    ] = False,
     workers: Annotated[int, CellWorkers] = 1,
     dask: Annotated[str | None, DaskAddress] = None,
     slots: Annotated[str | None, Slots] = None,
@@ -66,16 +70,18 @@ def benchmark(
         settings=tuple(settings or ()),
         targets=tuple(targets or ()),
         store_url=store,
+        afresh=afresh,
         workers=workers,
         dask=dask,
         slots=slots,
     )
     request.claim()
     set_environment()
+    from flows.benchmark import NothingFinished
     from flows.benchmark import benchmark as flow
 
-    with undisturbed():
-        record = flow(
+    with undisturbed(), suppress(NothingFinished):
+        flow(
             out=request.out,
             experiment=request.experiment,
             scenes=request.scenes,
@@ -86,13 +92,25 @@ def benchmark(
             settings=request.settings,
             targets=request.targets,
             store=request.store_url,
+            afresh=request.afresh,
             workers=request.workers,
             dask=request.dask,
             slots=request.slots,
         )
+    _tell_of(request.place)
+
+
+def _tell_of(place: Path) -> None:
+    """What did not finish, what has become worse, and where the page is."""
+    from mocoflow_core.methods.benchmark_folder import read_benchmark
+
+    record = read_benchmark(place)
+    assert record is not None  # The flow wrote it.
     for cell in record.cells:
         if cell.state != "finished":
             typer.echo(f"{cell.name} {cell.state}: {cell.reason}", err=True)
-    typer.echo(f"Benchmark: {request.place / 'benchmark.html'}")
+    for worse in record.regressions:
+        typer.echo(f"Worse than usual: {worse['what']}: {worse['why']}", err=True)
+    typer.echo(f"Benchmark: {place / 'benchmark.html'}")
     if record.cells and not any(cell.state == "finished" for cell in record.cells):
         sys.exit(1)

@@ -59,6 +59,7 @@ class BenchmarkRequest(BaseModel):
     settings: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
     store_url: str | None = None
+    afresh: bool = False
     workers: int = 1
     dask: str | None = None
     slots: str | None = None
@@ -83,7 +84,7 @@ class BenchmarkRequest(BaseModel):
 
     @cached_property
     def store(self) -> Store:
-        return open_users_store(self.store_url)
+        return open_users_store(str(self.place / "store") if self.afresh else self.store_url)
 
     @cached_property
     def waited_for(self) -> TargetConfig:
@@ -99,19 +100,26 @@ class BenchmarkRequest(BaseModel):
     @property
     def command(self) -> str:
         """The command line that asks for the same."""
-        words = ["mocoflow", "benchmark"]
-        words += ["--experiment", self.experiment] if self.experiment else []
+        words = ["mocoflow", "benchmark", *self._asked(), "--out", str(self.out)]
+        words += ["--store", self.store_url] if self.store_url else []
+        words += ["--afresh"] if self.afresh else []
+        return shlex.join([*words, *self.runs_on.words])
+
+    @property
+    def question(self) -> str:
+        """What is asked, and on what it runs; where the results go decides nothing."""
+        return shlex.join([*self._asked(), *self.runs_on.words])
+
+    def _asked(self) -> list[str]:
+        words = ["--experiment", self.experiment] if self.experiment else []
         words += ["--scenes", *self.scenes]
         words += ["--methods", *self.methods] if self.methods else []
-        words += ["--presets", *self.presets, "--seeds", str(self.seeds), "--out", str(self.out)]
+        words += ["--presets", *self.presets, "--seeds", str(self.seeds)]
         if self.budget_s is not None:
             words += ["--budget", f"{self.budget_s:g}"]
         for setting in self.settings:
             words += ["--set", setting]
-        if self.targets:
-            words += ["--targets", *self.targets]
-        words += ["--store", self.store_url] if self.store_url else []
-        return shlex.join([*words, *self.runs_on.words])
+        return [*words, "--targets", *self.targets] if self.targets else words
 
     def claim(self) -> BenchmarkFolder:
         """Take the output folder. Raises InputError for anything that no cell could run with."""
@@ -121,6 +129,7 @@ class BenchmarkRequest(BaseModel):
             settings=self.settings,
             budget_s=self.budget_s,
             command=self.command,
+            question=self.question,
         )
         return BenchmarkFolder.claim(self.place, begun)
 
@@ -152,7 +161,7 @@ class BenchmarkRequest(BaseModel):
             budget_s=self.budget_s,
             settings=(*self.settings, *scene.settings, *changes),
             import_settings=scene.import_settings,
-            store_url=self.store.url if self.store_url else None,
+            store_url=self.store.url if self.store_url or self.afresh else None,
         )
 
     def _cell(self, scene: AskedScene, preset: str, method: str, seed: int) -> Cell:
@@ -184,6 +193,12 @@ class BenchmarkRequest(BaseModel):
         return [method for method in self.methods if method in SETTINGS]
 
     def _check(self) -> None:
+        if self.afresh and self.store_url:
+            raise InputError(
+                "--afresh has a store of its own",
+                f"--store {self.store_url} as well",
+                "Give one of both.",
+            )
         if self.experiment is not None:
             _all_known("--experiment", (self.experiment,), tuple(EXPERIMENTS))
         _all_known("--presets", self.presets, tuple(PRESETS))

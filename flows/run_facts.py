@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -98,9 +98,15 @@ def show_benchmark_in_prefect(record: BenchmarkRecord, page: Path, chart: Path) 
     rows = [{**row, "scene": unlinked(str(row["scene"]))} for row in record.summary]
     create_table_artifact(rows, key="benchmark-scores", description=asked)
     lines = ["# Error against run time", "", code(str(page)), "", *_embedded(chart)]
-    lines += [asked, "", "| omission | why |", "|-|-|"]
-    lines += [f"| {plain(str(o['what']))} | {plain(str(o['why']))} |" for o in record.omissions]
+    lines += [asked, *_listed("worse than usual", record.regressions)]
+    lines += _listed("omission", record.omissions)
     create_markdown_artifact("\n".join(lines), key="benchmark", description=asked)
+
+
+def _listed(title: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A table of what and why; nothing where there is nothing."""
+    rows = [f"| {plain(str(row['what']))} | {plain(str(row['why']))} |" for row in found]
+    return ["", f"| {title} | |", "|-|-|", *rows] if rows else []
 
 
 def _embedded(picture: Path) -> list[str]:

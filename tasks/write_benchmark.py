@@ -9,6 +9,7 @@ from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.methods.experiments import EXPERIMENTS, USUAL
 from mocoflow_core.metrics.benchmark_tables import read_runs
 from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.history import HistoryRow, write_history
 from mocoflow_core.metrics.misalignment import read_misalignment
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import read_times
@@ -18,7 +19,7 @@ from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.markdown_tables import write_markdown_tables
 from tasks.stage import Stage, Summary, stage
 
-ALGORITHM_VERSION = 4  # The photographs' own scores.
+ALGORITHM_VERSION = 5  # The nights before.
 
 
 @stage(BenchmarkArtifact, ALGORITHM_VERSION)
@@ -28,11 +29,14 @@ def write_benchmark(
     cells: list[dict[str, JsonValue]],
     command: str,
     experiment: str | None,
+    past: list[dict[str, JsonValue]],
 ) -> Summary:
     """Error against run time with median and range, scores, time to target, omissions, machine.
 
-    Output: ``benchmark.html``, ``table.md``, and ``error_against_time.png`` where a cell finished.
-    Seconds.
+    And how this night compares with those before: ``past``, as rows of the history.
+
+    Output: ``benchmark.html``, ``table.md``, ``history.parquet``, and ``error_against_time.png``
+    where a cell finished. Seconds.
     """
     held = work.open(tables)
     results = BenchmarkResults(
@@ -42,11 +46,14 @@ def write_benchmark(
         times=read_times(held / "time_to_target.parquet"),
         misplaced=read_misalignment(held / "misalignment.parquet"),
         experiment=USUAL if experiment is None else EXPERIMENTS[experiment],
+        past=[HistoryRow(**row) for row in past],  # type: ignore[arg-type]
     )
     write_benchmark_chart(results.curves, work.folder / "error_against_time.png")
     write_benchmark_page(results, command, work.folder / "benchmark.html")
     write_markdown_tables(results, command, work.folder / "table.md")
+    write_history([*results.past, *results.tonight()], work.folder / "history.parquet")
     return {
         "summary": results.summary_records(),
         "omissions": [omission._asdict() for omission in results.omissions()],
+        "regressions": [worse._asdict() for worse in results.regressions()],
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
@@ -73,10 +74,13 @@ class BenchmarkRecord(BaseModel):
     settings: tuple[str, ...]
     budget_s: float | None
     command: str
+    question: str = ""  # the command without its places: nights that ask the same are compared
     finished: bool = False
+    finished_at: str = ""  # UTC, ISO 8601
     cells: tuple[CellRecord, ...] = ()
     summary: tuple[dict[str, JsonValue], ...] = ()
     omissions: tuple[dict[str, JsonValue], ...] = ()
+    regressions: tuple[dict[str, JsonValue], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -90,13 +94,15 @@ class BenchmarkFolder:
     def claim(cls, path: Path, begun: BenchmarkRecord) -> BenchmarkFolder:
         """Take a new or empty folder, or one that more scenes, methods and seeds may go into."""
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            held = _record(path)
+            held = read_benchmark(path)
             if held is None or (held.settings, held.budget_s) != (begun.settings, begun.budget_s):
                 raise InputError(
                     "--out must be new, empty, or of a benchmark with the same --set and --budget",
                     f"{path} with {'another benchmark' if held else 'something else in it'}",
                     "Choose another folder.",
                 )
+            if held.question == begun.question:
+                begun = begun.model_copy(update={"finished_at": held.finished_at})
         with full_disk_is_bad_input(f"The folder {path}"):
             path.mkdir(parents=True, exist_ok=True)
             return cls(path, begun)._written(begun)
@@ -109,8 +115,10 @@ class BenchmarkFolder:
             beside.replace(self.path / name)
 
     def finish(self, values: Mapping[str, object]) -> BenchmarkRecord:
-        """Write ``benchmark.json``, the last file."""
-        record = self.begun.model_copy(update={**values, "finished": True})
+        """Write ``benchmark.json``, the last file. One that was finished before keeps its time."""
+        moment = self.begun.finished_at or datetime.now(UTC).isoformat(timespec="seconds")
+        done = {**values, "finished": True, "finished_at": moment}
+        record = self.begun.model_copy(update=done)
         with full_disk_is_bad_input(f"The folder {self.path}"):
             self._written(record)
         return record
@@ -132,7 +140,8 @@ def finished_cells(records: Iterable[Mapping[str, JsonValue]], folder: Path) -> 
     ]
 
 
-def _record(folder: Path) -> BenchmarkRecord | None:
+def read_benchmark(folder: Path) -> BenchmarkRecord | None:
+    """The record in a benchmark's folder; None where there is none that can be read."""
     try:
         return BenchmarkRecord.model_validate_json((folder / RECORD).read_bytes())
     except (OSError, ValidationError):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -46,7 +48,7 @@ def plot_benchmark(runs: Runs[CurveRow]) -> Figure | None:
         for axes in places[len(scenes) :]:
             axes.set_axis_off()
         figure.legend(
-            handles=_legend(runs), loc="outside lower center", ncols=4, frameon=False, fontsize=8.5
+            handles=legend(runs), loc="outside lower center", ncols=4, frameon=False, fontsize=8.5
         )
     return figure
 
@@ -65,7 +67,7 @@ def _panel(axes: Axes, shown: Runs[CurveRow], runs: Runs[CurveRow]) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     for contender, seeds in shown.items():
-        colour, style = _look(contender, runs)
+        colour, style = look_of(contender, runs)
         ends = last_points(seeds.values(), METRIC)
         if contender.method == BASELINE:
             _level(axes, ends)
@@ -93,23 +95,26 @@ def _level(axes: Axes, ends: np.ndarray) -> None:
         axes.axhline(float(np.median(ends[:, 1])), color=WARM, lw=1.2, ls=LEVEL, zorder=2)
 
 
-def _look(contender: Contender, runs: Runs[CurveRow]) -> tuple[str, str]:
-    """Colour by method, dashes by preset."""
-    methods = [method for method in dict.fromkeys(c.method for c in runs) if method != BASELINE]
-    presets = list(dict.fromkeys(c.preset for c in runs))
-    place = methods.index(contender.method) if contender.method != BASELINE else 0
+def look_of(contender: Contender, all_shown: Iterable[Contender]) -> tuple[str, Any]:
+    """Colour by method, dashes by preset; the posed mesh has its own."""
+    if contender.method == BASELINE:
+        return WARM, LEVEL
+    every = list(all_shown)
+    methods = [method for method in dict.fromkeys(c.method for c in every) if method != BASELINE]
+    presets = list(dict.fromkeys(c.preset for c in every))
+    place = methods.index(contender.method)
     return COLOURS[place % len(COLOURS)], STYLES[presets.index(contender.preset) % len(STYLES)]
 
 
-def _legend(runs: Runs[CurveRow]) -> list[Line2D]:
-    several = len({contender.preset for contender in runs}) > 1
+def legend(all_shown: Iterable[Contender]) -> list[Line2D]:
+    """One handle for each method, and each preset where there are several."""
+    every = list(all_shown)
+    several = len({contender.preset for contender in every}) > 1
     handles = {}
-    for contender in runs:
+    for contender in every:
         name = contender.method.replace("_", " ")
-        if contender.method == BASELINE:
-            handles[name] = Line2D([], [], color=WARM, lw=1.2, ls=LEVEL, label=name)
-            continue
-        name = f"{name}, {contender.preset}" if several else name
-        colour, style = _look(contender, runs)
+        if several and contender.method != BASELINE:
+            name = f"{name}, {contender.preset}"
+        colour, style = look_of(contender, every)
         handles[name] = Line2D([], [], color=colour, ls=style, lw=1.8, label=name)
     return list(handles.values())

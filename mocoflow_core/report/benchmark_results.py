@@ -8,11 +8,14 @@ from typing import Any
 
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.methods.experiments import USUAL, Experiment
+from mocoflow_core.methods.past_benchmarks import night_rows
 from mocoflow_core.metrics.benchmark_tables import Runs
 from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.history import NOW, HistoryRow, regressions
 from mocoflow_core.metrics.misalignment import MisalignmentRow
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import TimeToTarget
+from mocoflow_core.report.history_words import in_words
 from mocoflow_core.report.omissions import Omission, omissions
 from mocoflow_core.report.seed_summary import Summaries, summarise
 
@@ -26,6 +29,7 @@ class BenchmarkResults:
     curves: Runs[CurveRow]
     times: Sequence[TimeToTarget]
     misplaced: Sequence[MisalignmentRow] = ()
+    past: Sequence[HistoryRow] = ()  # earlier nights
     experiment: Experiment = USUAL
 
     def summaries(self) -> Summaries:
@@ -36,6 +40,14 @@ class BenchmarkResults:
     def omissions(self) -> list[Omission]:
         """What is missing, or compares nothing."""
         return omissions(self.cells, self.scores, self.times)
+
+    def tonight(self) -> list[HistoryRow]:
+        """This night's numbers, as later ones will read them."""
+        return night_rows(NOW, self.cells, self.summary_records())
+
+    def regressions(self) -> list[Omission]:
+        """What is worse than it usually was, in words."""
+        return [in_words(found) for found in regressions(self.tonight(), self.past)]
 
     def summary_records(self) -> list[dict[str, Any]]:
         """The summaries as plain values, for ``benchmark.json``."""

@@ -9,7 +9,7 @@ from mocoflow_core.methods.ablations import change_of
 from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.markdown_text import code, plain
-from mocoflow_core.report.metric_labels import MetricLabel, label_of
+from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.misalignment_table import misalignment_tables
 from mocoflow_core.report.summary_table import (
     ABOUT_PHOTOGRAPHS,
@@ -42,7 +42,7 @@ def _scores(results: BenchmarkResults) -> Iterator[str]:
     summaries = results.summaries()
     metrics = shown_metrics(summaries)
     several = len({contender.preset for contender in summaries}) > 1
-    labels = [_titled(label_of(metric)) for metric in metrics]
+    labels = [label_of(metric).with_title() for metric in metrics]
     for rows in by_scene(summary_rows(summaries, metrics)):
         yield from ("", f"## {plain(rows[0].contender.scene)}", "")
         yield from _table(["method", "seeds", *labels], (_cells(row, several) for row in rows))
@@ -72,13 +72,17 @@ def _text(cell: SummaryCell) -> str:
 def _misplaced(results: BenchmarkResults) -> Iterator[str]:
     for table in misalignment_tables(results.misplaced):
         yield from ("", f"## {plain(table.scene)}, misplaced views", "")
-        heading = ["", *(_titled(label) for label in table.labels)]
+        heading = ["", *(label.with_title() for label in table.labels)]
         yield from _table(heading, ([row.name, *row.values] for row in table.rows))
     for protocol in sorted({row.protocol for row in results.misplaced}):
         yield from ("", f"Protocol: {plain(protocol)}.")
 
 
 def _missing(results: BenchmarkResults) -> Iterator[str]:
+    worse = results.regressions()
+    if worse:
+        yield from ("", "## Worse than usual", "")
+        yield from (f"- {plain(found.what)}: {plain(found.why)}" for found in worse)
     found = results.omissions()
     if found:
         yield from ("", "## Omissions", "")
@@ -93,10 +97,6 @@ def _table(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[st
 
 def _line(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"
-
-
-def _titled(label: MetricLabel) -> str:
-    return f"{label.title}, {label.unit}" if label.unit else label.title
 
 
 def _words(name: str) -> str:

@@ -20,6 +20,10 @@ class MetricLabel(NamedTuple):
             return "–"
         return f"{value:.{self.digits}f}" if math.isfinite(value) else "∞"
 
+    def with_title(self) -> str:
+        """The title with the unit that the numbers have."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
+
     def with_unit(self, value: float) -> str:
         """The value with its digits and unit."""
         return f"{self.text(value)} {self.unit}".rstrip()
@@ -51,7 +55,14 @@ BODY_METRICS = {
 }
 
 
+# What a run costs, on its training clock.
+COSTS = {
+    "cpu_s": MetricLabel("training, CPU", "s", 1, False),
+    "wall_s": MetricLabel("training, wall", "s", 1, False),
+}
+
+
 def label_of(metric: str) -> MetricLabel:
     """The label of a metric; one that has none here is shown by its own name."""
-    known = VIEW_METRICS | BODY_METRICS
+    known = VIEW_METRICS | BODY_METRICS | COSTS
     return known.get(metric, MetricLabel(metric, "mm" if metric.endswith("_mm") else "", 3, True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from uuid import uuid4
 
 import pytest
 import yaml
@@ -12,6 +13,7 @@ from prefect.flows import load_flow_from_entrypoint
 from prefect.schedules import Cron
 
 from flows.data_set_roots import ROOTS
+from flows.regression_event import EVENT
 
 FOLDER = Path(__file__).parents[2] / "deployments"
 DEPLOYMENTS = yaml.safe_load((FOLDER / "prefect.yaml").read_text())["deployments"]
@@ -26,6 +28,25 @@ FLOWS = {
     "synthetic": "benchmark",
     "nightly": "stability",
 }
+
+
+NOTIFICATIONS = yaml.safe_load((FOLDER / "notifications.yaml").read_text())["automations"]
+
+
+@pytest.mark.parametrize("content", NOTIFICATIONS, ids=lambda content: content["name"])
+def test_a_notification_is_an_automation_once_it_has_a_block(content):
+    actions = [{**action, "block_document_id": str(uuid4())} for action in content["actions"]]
+    AutomationCore.model_validate({**content, "actions": actions})
+
+
+def test_people_are_told_of_the_event_that_a_benchmark_emits():
+    assert EVENT in {event for content in NOTIFICATIONS for event in content["trigger"]["expect"]}
+
+
+@pytest.mark.parametrize("deployment", DEPLOYMENTS, ids=lambda d: d["name"])
+def test_scheduled_benchmarks_measure_everything_again(deployment):
+    if "benchmark" in deployment["tags"]:
+        assert deployment["parameters"]["afresh"]
 
 
 def test_all_deployments_are_there():

@@ -16,11 +16,14 @@ from prefect.client.schemas.objects import StateType
 from prefect.states import Cancelling
 from pyarrow import parquet
 
+from flows import regression_event
+from flows.benchmark import NothingFinished
 from flows.benchmark_request import BenchmarkRequest
 from flows.command_line import main
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.manifest import MANIFEST
 from mocoflow_core.metrics.curve import read_curve
+from mocoflow_core.metrics.history import FEWEST_NIGHTS
 from mocoflow_core.metrics.table import read_scores
 
 METHODS = ("mocoflow", "without_local", "posed_mesh")
@@ -165,6 +168,47 @@ def test_a_cell_can_be_cancelled_alone_and_the_same_benchmark_goes_on_from_there
     assert [cell.state for cell in again.cells] == ["finished", "finished"]
 
 
+def test_a_benchmark_afresh_takes_nothing_from_another_store(first, compare, toy_scene, tmp_path):
+    one = {"scenes": (str(toy_scene),), "methods": METHODS[:1], "seeds": 1}
+    [cell] = compare(tmp_path / "afresh", store=None, afresh=True, **one).cells
+    assert not cell.from_store
+    stages = {path.name for path in (tmp_path / "afresh/store").iterdir()}
+    assert {"extract_clip", "optimise_scene", "write_benchmark"} <= stages
+
+
+def test_a_night_that_is_worse_than_those_before_says_so(
+    first, compare, toy_scene, tmp_path, monkeypatch
+):
+    asked = {"scenes": (str(toy_scene),), "methods": METHODS[:1], "seeds": 1}
+    told = []
+    monkeypatch.setattr(regression_event, "emit_event", lambda **event: told.append(event))
+    for night in range(FEWEST_NIGHTS):
+        assert not compare(tmp_path / f"night{night}", **asked).regressions
+        file = tmp_path / f"night{night}" / "benchmark.json"
+        record = json.loads(file.read_text())
+        for row in record["summary"]:
+            row["mean"] += 5.0 if row["metric"] == "psnr_union" else 0.0
+        file.write_text(json.dumps(record))
+    assert not told
+    [worse] = compare(tmp_path / "tonight", **asked).regressions
+    assert worse["what"] == "toy/toy/mocoflow: PSNR, person"
+    [event] = told
+    assert worse["why"] in event["payload"]["text"]
+    page = (tmp_path / "tonight/benchmark.html").read_text()
+    assert "Over the nights" in page
+    assert worse["why"] in page
+    nights = parquet.read_table(tmp_path / "tonight/history.parquet")["night"].unique()
+    assert len(nights) == FEWEST_NIGHTS + 1
+
+
+def test_one_of_which_nothing_finished_has_failed_and_says_why(compare, broken_scene, tmp_path):
+    with pytest.raises(NothingFinished, match="none of 1 runs"):
+        compare(tmp_path / "out", scenes=(str(broken_scene),), methods=METHODS[:1], seeds=1)
+    record = json.loads((tmp_path / "out/benchmark.json").read_text())
+    assert record["finished"]
+    assert "scene.json" in (tmp_path / "out/benchmark.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("changes", "because"),
     [
@@ -174,6 +218,7 @@ def test_a_cell_can_be_cancelled_alone_and_the_same_benchmark_goes_on_from_there
         ({"scenes": ()}, "has a scene"),
         ({"seeds": 0}, "has a scene, a seed"),
         ({"methods": ("posed_mesh",)}, "a method that is run"),
+        ({"afresh": True, "store_url": "there"}, "--afresh has a store of its own"),
         ({"methods": ("without_luck",)}, "--methods must be"),
         ({"methods": ("mocoflow", "mocoflow")}, "--methods must be different"),
         ({"presets": ("fats",)}, "fast, toy"),
@@ -214,5 +259,5 @@ def test_the_command_of_a_benchmark_asks_for_the_same_again(tmp_path):
     )
     assert request.command == (
         "mocoflow benchmark --scenes turn,seed=1 --methods mocoflow --presets fast --seeds 2 "
-        f"--out '{tmp_path}/a folder' --budget 30 --set schedule.rays=64 --targets psnr=20"
+        f"--budget 30 --set schedule.rays=64 --targets psnr=20 --out '{tmp_path}/a folder'"
     )

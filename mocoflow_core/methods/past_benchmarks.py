@@ -1,0 +1,84 @@
+"""What the same benchmark found in earlier nights, from the records in the folders around it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from mocoflow_core.methods.benchmark_folder import (
+    RECORD,
+    BenchmarkRecord,
+    CellRecord,
+    read_benchmark,
+)
+from mocoflow_core.metrics.benchmark_tables import Contender
+from mocoflow_core.metrics.history import SECONDS, HistoryRow
+
+# Nights that are shown; more are read by nobody.
+SHOWN_NIGHTS = 60
+# Of a machine's description: what decides how fast it is.
+MACHINE = ("model", "cores", "threads", "devices")
+
+
+def past_nights(own: Path, begun: BenchmarkRecord) -> list[HistoryRow]:
+    """The numbers of finished benchmarks that asked the same, in the folders beside ``own``.
+
+    Those that were finished later than ``begun`` once was, where it was, are left out: what a
+    night is compared with does not change afterwards.
+    """
+    before = begun.finished_at or "~"  # Behind every moment.
+    found = [
+        record
+        for file in own.parent.glob(f"*/{RECORD}")
+        if file.parent != own and (record := read_benchmark(file.parent)) is not None
+    ]
+    nights = sorted(
+        (r for r in found if r.finished and r.question == begun.question != ""),
+        key=lambda record: record.finished_at,
+    )
+    earlier = [record for record in nights if record.finished_at < before]
+    return [
+        row
+        for record in earlier[-SHOWN_NIGHTS:]
+        for row in night_rows(record.finished_at, record.cells, record.summary)
+    ]
+
+
+def night_rows(
+    night: str, cells: Iterable[CellRecord], summary: Iterable[Mapping[str, Any]]
+) -> list[HistoryRow]:
+    """The numbers of one night.
+
+    Args:
+        summary: means over seeds, as ``benchmark.json`` holds them.
+    """
+    trained: dict[Contender, list[CellRecord]] = {}
+    for cell in cells:
+        if cell.state == "finished":
+            trained.setdefault(Contender(cell.scene, cell.preset, cell.method), []).append(cell)
+    rows = [
+        HistoryRow(
+            *(night, "", str(entry["scene"]), str(entry["preset"]), str(entry["method"])),
+            *(str(entry["metric"]), float(entry["mean"])),
+        )
+        for entry in summary
+    ]
+    for contender, seeds in trained.items():
+        # What an earlier command trained says nothing of this night's speed.
+        measured = [cell for cell in seeds if not cell.from_store]
+        for name in SECONDS:
+            spent = [s for cell in measured if (s := getattr(cell, name)) is not None]
+            if spent:
+                usual = float(median(spent))
+                rows.append(HistoryRow(night, _machine(measured), *contender, name, usual))
+    return rows
+
+
+def _machine(cells: Iterable[CellRecord]) -> str:
+    described = {
+        ", ".join(f"{name} {cell.machine[name]}" for name in MACHINE if name in cell.machine)
+        for cell in cells
+    }
+    return "; ".join(sorted(described))

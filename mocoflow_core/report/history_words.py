@@ -1,0 +1,36 @@
+"""The history of a benchmark in words: what has become worse, and what counts as worse."""
+
+from __future__ import annotations
+
+from mocoflow_core.metrics.history import FEWEST_NIGHTS, LAST_NIGHTS, MARGINS, Regression
+from mocoflow_core.report.metric_labels import label_of
+from mocoflow_core.report.omissions import Omission
+
+
+def in_words(found: Regression) -> Omission:
+    """What is worse, and by how much."""
+    name = "/".join(found.contender)
+    if not found.measure:
+        return Omission(name, f"no number at all, which {found.nights} of the last nights had")
+    label = label_of(found.measure)
+    allowed = label.with_unit(MARGINS[found.measure].at(found.usual))
+    return Omission(
+        f"{name}: {label.title}",
+        f"{label.with_unit(found.value)}; usually {label.with_unit(found.usual)} (median of the "
+        f"last {found.nights}), of which {allowed} would be no news",
+    )
+
+
+def margins_in_words() -> str:
+    """When a number is flagged."""
+    parts = []
+    for measure, margin in MARGINS.items():
+        label = label_of(measure)
+        least = f"{margin.absolute:g} {label.unit}".rstrip()
+        share = f"{margin.relative:.0%}, at least " if margin.relative else ""
+        parts.append(f"{label.title} {share}{least}")
+    return (
+        f"Flagged is what is worse than the median of the last {LAST_NIGHTS} nights by more than: "
+        f"{'; '.join(parts)}. With fewer than {FEWEST_NIGHTS} nights nothing is. Seconds are "
+        "compared with nights on the same machine."
+    )
