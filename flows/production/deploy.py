@@ -1,4 +1,4 @@
-"""Bring a server up to date: work pool, queues, automation, store, deployments, schedules."""
+"""Bring a server up to date: work pool, queues, automations, store, deployments, schedules."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 import yaml
 from prefect.client.orchestration import SyncPrefectClient, get_client
 from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
-from prefect.events.schemas.automations import AutomationCore
 from prefect.exceptions import ObjectNotFound
 from prefect.workers.process import ProcessWorker
 
 from flows.data_set_roots import ROOTS, configured_roots
+from flows.production.automations import make_automation, make_notifications
 from flows.production.site import PREFECT
 from flows.production.stores import make_store
 from mocoflow_core.errors import InputError
@@ -23,25 +23,27 @@ FOLDER = Path("deployments")
 
 
 def deploy() -> list[str]:
-    """Make or change what the files say, and give a line on each schedule.
+    """Make or change what the files say, and give a line on each schedule, and on who is told.
 
     The schedule of a data set runs where its root is configured, and is paused where it is not.
 
     Raises InputError outside of the repository's root.
     """
-    pool, zombies = _read("pool.yaml"), _read("zombies.yaml")
+    pool = _read("pool.yaml")
     make_store()
     with get_client(sync_client=True) as client:
         _make_pool(client, pool)
         for queue in pool["queues"]:
             _make_queue(client, pool["name"], queue)
-        _make_automation(client, AutomationCore.model_validate(zombies))
+        make_automation(client, _read("zombies.yaml"))
+        told = make_notifications(client, _read("notifications.yaml")["automations"])
         _deploy_flows()
-        return [
+        schedules = [
             line
             for deployment in _read("prefect.yaml")["deployments"]
             for line in _set_schedules(client, deployment)
         ]
+    return [*schedules, told]
 
 
 def _read(name: str) -> dict[str, Any]:
@@ -73,16 +75,6 @@ def _make_queue(client: SyncPrefectClient, pool: str, queue: dict[str, Any]) -> 
         client.create_work_queue(**queue, work_pool_name=pool)
     else:
         client.update_work_queue(found.id, **queue)
-
-
-def _make_automation(client: SyncPrefectClient, wanted: AutomationCore) -> None:
-    named = {"automations": {"name": {"any_": [wanted.name]}}}
-    content = wanted.model_dump(mode="json", exclude_unset=True)
-    found = client.request("POST", "/automations/filter", json=named).json()
-    if found:
-        client.request("PUT", "/automations/{id}", path_params={"id": found[0]["id"]}, json=content)
-    else:
-        client.request("POST", "/automations/", json=content)
 
 
 def _deploy_flows() -> None:
