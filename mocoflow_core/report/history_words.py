@@ -13,11 +13,13 @@ def in_words(found: Regression) -> Omission:
     if not found.measure:
         return Omission(name, f"no number at all, which {found.nights} of the last nights had")
     label = label_of(found.measure)
-    allowed = label.with_unit(MARGINS[found.measure].at(found.usual))
+    loss = label.with_unit(abs(found.value - found.usual))
+    margin = label.with_unit(MARGINS[found.measure].at(found.usual))
     return Omission(
         f"{name}: {label.title}",
-        f"{label.with_unit(found.value)}; usually {label.with_unit(found.usual)} (median of the "
-        f"last {found.nights}), of which {allowed} would be no news",
+        f"{label.with_unit(found.value)}, which is {loss} worse than "
+        f"{label.with_unit(found.usual)}, the median of the last {found.nights} nights "
+        f"(flagged above {margin})",
     )
 
 

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.metrics.benchmark_tables import Contender
 from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.history import HistoryRow
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import Target, times_to_targets
 from mocoflow_core.report.benchmark_page import write_benchmark_page
@@ -96,6 +98,30 @@ def test_command_machine_ablation_and_protocol_are_written_down(page):
     assert "losses.local_share=0.0" in page
     assert "Protocol: protocol one." in page
     assert "3 methods" in page
+
+
+def test_a_first_night_has_no_history(page):
+    assert "Over the nights" not in page
+    assert "worse than in earlier nights" not in page
+
+
+def test_what_is_worse_than_in_the_nights_before_stands_above_and_beside_their_chart(
+    results, tmp_path
+):
+    past = [
+        HistoryRow(f"2026-01-0{night}", "", "turn", "fast", method, "psnr_union", value)
+        for night in (1, 2, 3)
+        for method, value in (("mocoflow", 22.0), ("without_local", 20.0))
+    ]
+    path = tmp_path / "benchmark.html"
+    write_benchmark_page(replace(results, past=past), COMMAND, path)
+    page = path.read_text()
+    assert "1 number is worse than in earlier nights" in page
+    nights = page[page.index("Over the nights") :]
+    assert "turn/fast/mocoflow: PSNR, person" in nights
+    assert "21.00 dB, which is 1.00 dB worse than 22.00 dB, the median of the last 3" in nights
+    assert "01-03" in nights
+    assert "PSNR, person 0.3 dB" in nights
 
 
 def test_a_benchmark_of_failures_alone_still_has_its_page(tmp_path):

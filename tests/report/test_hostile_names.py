@@ -10,6 +10,7 @@ from markdown_it import MarkdownIt
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.metrics.benchmark_tables import Contender
 from mocoflow_core.metrics.curve import CurveRow
+from mocoflow_core.metrics.history import HistoryRow
 from mocoflow_core.metrics.misalignment import MisalignmentRow
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import Target, times_to_targets
@@ -72,7 +73,8 @@ def benchmark_of(name: str) -> BenchmarkResults:
     ]
     times = times_to_targets(curves, [Target("psnr_union", 33.0)])
     moved = [MisalignmentRow(name, "shifted", 10.0, "px", 2.5, "psnr", 17.0, 3, protocol)]
-    return BenchmarkResults(cells, scores, curves, times, moved)
+    past = [HistoryRow(f"n{n}", name, *contender, "psnr_union", 30.0) for n in range(3)]
+    return BenchmarkResults(cells, scores, curves, times, moved, past=past)
 
 
 def benchmark_page(name, folder):
