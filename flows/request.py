@@ -83,8 +83,8 @@ class Request(BaseModel):
         until = () if self.until is None else (read_target(self.until),)
         preset = PRESETS[self.preset]()
         chosen = with_settings(preset, (*self.settings, *budget, *until))
-        require_sense(chosen, preset)
         self._allowed.check_files(chosen)
+        require_sense(chosen, preset)
         return chosen
 
     @cached_property
