@@ -41,6 +41,11 @@ class AllowedFolders:
             store=os.environ.get(STORE) or None,
         )
 
+    @property
+    def confine(self) -> bool:
+        """Whether runs may not do everything: others than whoever set this up may start them."""
+        return bool(self.data) or self.results is not None
+
     def to_read(self, path: Path, parameter: str) -> Path:
         """The path itself, resolved where roots are set; a relative one lies below one of these.
 
