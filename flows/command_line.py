@@ -221,7 +221,9 @@ def stability(
     set_environment()
     from flows.stability import CasesFailed
     from flows.stability import stability as flow
+    from mocoflow_core.stability.catalogue import require_areas
 
+    require_areas(areas or ())
     try:
         with undisturbed():
             summary = flow(out=out, areas=tuple(areas or ()), quick_only=quick)

@@ -9,7 +9,7 @@ from prefect import flow
 
 from flows.demo_scene import DEMO_SCENE
 from flows.optimisation import optimise
-from flows.parameters import Budget, Devices, Machines, Seed, Setting, Until
+from flows.parameters import Budget, Devices, Machines, Rendezvous, Seed, Setting, Until
 from flows.plan_table import show_plan
 from flows.preparation import prepare
 from flows.request import Request
@@ -40,7 +40,7 @@ def reconstruct(
     store: str | None = None,
     devices: Devices | None = None,
     machines: Machines = 1,
-    rendezvous: str | None = None,
+    rendezvous: Rendezvous | None = None,
 ) -> RunRecord:
     """Reconstruct the person of a scene folder and say how well it went.
 
