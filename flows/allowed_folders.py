@@ -6,7 +6,6 @@ On a command line, where none of these variables is set, every path is as it was
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from flows.data_set_roots import configured_roots
 from flows.user_folders import body_models_folder, cache_folder
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
+from mocoflow_core.named_files import named_files, require_networks
 
 DATA_ROOTS = "MOCOFLOW_DATA_ROOTS"
 RESULTS_ROOT = "MOCOFLOW_RESULTS_ROOT"
@@ -40,6 +40,11 @@ class AllowedFolders:
             results=Path(results).resolve() if results else None,
             store=os.environ.get(STORE) or None,
         )
+
+    @property
+    def confine(self) -> bool:
+        """Whether runs may not do everything: others than whoever set this up may start them."""
+        return bool(self.data) or self.results is not None
 
     def to_read(self, path: Path, parameter: str) -> Path:
         """The path itself, resolved where roots are set; a relative one lies below one of these.
@@ -84,25 +89,21 @@ class AllowedFolders:
         return str(self.to_write(Path(address), "store"))
 
     def check_files(self, part: ConfigurationPart) -> None:
-        """Raise InputError for a file that a configuration names outside of the data roots."""
-        for name, path in _files_of(part) if self.data else ():
+        """Before anything looks at the files that a configuration names.
+
+        Raises InputError for one outside of the data roots, whether there is any or not, and for
+        a network's file that is not there.
+        """
+        for name, path in named_files(part) if self.data else ():
             if not _below(path.resolve(), self._readable()):
                 raise _outside(name, path, self.data, DATA_ROOTS)
+        require_networks(part)
 
     def _readable(self) -> list[Path]:
         """The data, what was made of them, the user's body models, and earlier results."""
         made = [cache_folder() / "scenes", cache_folder() / "datasets", body_models_folder()]
         results = [self.results] if self.results else []
         return [*self.data, *(folder.resolve() for folder in made), *results]
-
-
-def _files_of(part: ConfigurationPart, above: str = "") -> Iterator[tuple[str, Path]]:
-    for name in type(part).model_fields:
-        value = getattr(part, name)
-        if isinstance(value, Path):
-            yield f"{above}{name}", value
-        elif isinstance(value, ConfigurationPart):
-            yield from _files_of(value, f"{above}{name}.")
 
 
 def _below(place: Path, roots: list[Path]) -> bool:

@@ -8,7 +8,17 @@ from typing import Any
 from prefect import flow
 
 from flows.benchmark_request import BenchmarkRequest
-from flows.parameters import Budget, Seeds, Setting
+from flows.parameters import (
+    Budget,
+    ExperimentName,
+    Method,
+    Processes,
+    Scheduler,
+    Seeds,
+    Setting,
+    Slots,
+    Target,
+)
 from flows.regression_event import tell_of_regressions
 from flows.results_folders import folder_of_this_run
 from flows.run_cells import run_cells
@@ -33,18 +43,18 @@ class NothingFinished(RuntimeError):
 def benchmark(
     out: Path | None = None,
     scenes: tuple[str, ...] | None = None,
-    methods: tuple[str, ...] | None = None,
+    methods: tuple[Method, ...] | None = None,
     presets: tuple[Preset, ...] | None = None,
-    experiment: str | None = None,
+    experiment: ExperimentName | None = None,
     seeds: Seeds = 3,
     budget_s: Budget | None = None,
     settings: tuple[Setting, ...] = (),
-    targets: tuple[str, ...] = (),
+    targets: tuple[Target, ...] = (),
     store: str | None = None,
     afresh: bool = False,
-    workers: int = 1,
-    dask: str | None = None,
-    slots: str | None = None,
+    workers: Processes = 1,
+    dask: Scheduler | None = None,
+    slots: Slots | None = None,
 ) -> BenchmarkRecord:
     """Compare methods and presets on several scenes, each cell a flow run of its own.
 

@@ -212,7 +212,9 @@ class BenchmarkRequest(BaseModel):
                 "posed_mesh alone is scored within the runs of another method.",
             )
         for preset in self.presets:
-            person = with_settings(PRESETS[preset](), self.settings).person_scores
+            chosen = with_settings(PRESETS[preset](), self.settings)
+            AllowedFolders.of_environment().check_files(chosen)
+            person = chosen.person_scores
             require_own_networks(person)
             require_measured(self.waited_for, person.on_curve and person.use != "off")
         refusals = [self._refusal(p, m) for p in self.presets for m in self._running()]

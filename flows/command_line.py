@@ -25,6 +25,7 @@ from flows.scene_options import (
 )
 from flows.store_commands import store_app
 from flows.video_options import Clip, Focal, is_bare_video, video_settings
+from flows.worker_options import SlotsOfServer
 from mocoflow_core.errors import InputError
 
 app = typer.Typer(
@@ -78,6 +79,7 @@ def reconstruct(
     rendezvous: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Where several machines meet.")
     ] = None,
+    slots: Annotated[str | None, SlotsOfServer] = None,
 ) -> None:
     """Reconstruct a scene: train, render, score, report."""
     from flows.request import Request
@@ -119,6 +121,7 @@ def reconstruct(
             devices=devices,
             machines=machines,
             rendezvous=rendezvous,
+            slots=slots,
         )
     typer.echo(f"Report: {out / 'report.html'}")
 
@@ -221,7 +224,9 @@ def stability(
     set_environment()
     from flows.stability import CasesFailed
     from flows.stability import stability as flow
+    from mocoflow_core.stability.catalogue import require_areas
 
+    require_areas(areas or ())
     try:
         with undisturbed():
             summary = flow(out=out, areas=tuple(areas or ()), quick_only=quick)

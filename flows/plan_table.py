@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import get_args
 
 from prefect.artifacts import create_table_artifact
@@ -14,7 +15,7 @@ from mocoflow_core.artifacts import PlanArtifact
 from mocoflow_core.planning.decision import Decision, Part
 from mocoflow_core.planning.plan import ScenePlan
 from mocoflow_core.planning.scoring import decide_evaluation
-from mocoflow_core.report.markdown_text import plain
+from mocoflow_core.report.markdown_text import plain, unlinked_rows
 
 _WORDS = {True: "needed", False: "left out"}
 
@@ -24,10 +25,14 @@ def show_plan(request: Request, made: PlanArtifact) -> ScenePlan:
     text = (request.store.folder(made) / "plan.json").read_text()
     plan = ScenePlan.model_validate_json(text)
     decisions = (*plan.decisions, decide_evaluation(request.scene))
-    rows = [{"part": decision.part, **_row(decision)} for decision in decisions]
-    name = request.scene.description.name
-    create_table_artifact(rows, key="plan", description=f"What {plain(name)} needs")
+    show_decisions(request.scene.description.name, decisions)
     return plan
+
+
+def show_decisions(scene: str, decisions: Iterable[Decision]) -> None:
+    """On the run's page: what a scene needs and what not, and why."""
+    rows = unlinked_rows({"part": decision.part, **_row(decision)} for decision in decisions)
+    create_table_artifact(rows, key="plan", description=f"What {plain(scene)} needs")
 
 
 def print_plan(plan: ScenePlan, console: Console) -> None:

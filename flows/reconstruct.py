@@ -9,14 +9,15 @@ from prefect import flow
 
 from flows.demo_scene import DEMO_SCENE
 from flows.optimisation import optimise
-from flows.parameters import Budget, Devices, Machines, Seed, Setting, Until
+from flows.parameters import Budget, Devices, Machines, Rendezvous, Seed, Setting, Slots, Until
 from flows.plan_table import show_plan
 from flows.preparation import prepare
 from flows.request import Request
 from flows.results_folders import folder_of_this_run
 from flows.run_facts import describe_run, records, show_in_prefect
+from flows.slots import held_slot, require_slots
 from mocoflow_core.io.machine import describe_machine
-from mocoflow_core.io.run_folder import RunRecord
+from mocoflow_core.io.run_folder import RunFolder, RunRecord
 from mocoflow_core.presets import Preset
 from tasks.extract_evaluation import extract_evaluation
 from tasks.render_views import render_views
@@ -40,7 +41,8 @@ def reconstruct(
     store: str | None = None,
     devices: Devices | None = None,
     machines: Machines = 1,
-    rendezvous: str | None = None,
+    rendezvous: Rendezvous | None = None,
+    slots: Slots | None = None,
 ) -> RunRecord:
     """Reconstruct the person of a scene folder and say how well it went.
 
@@ -60,8 +62,12 @@ def reconstruct(
             GPUs where there are several, else one process on the CPU.
         machines: that have so many devices each and the store at the same path.
         rendezvous: ``host:port`` at which several machines meet.
+        slots: global concurrency limit of the Prefect server, of which the run holds one slot
+            while it works.
     """
-    start, machine = perf_counter(), describe_machine()
+    start = perf_counter()
+    if slots is not None:
+        require_slots(slots)
     request = Request(
         scene_path=scene,
         preset=preset,
@@ -77,6 +83,14 @@ def reconstruct(
         rendezvous=rendezvous,
     )
     folder = request.claim(out or folder_of_this_run())
+    claimed_s = perf_counter() - start
+    with held_slot(slots):
+        return _work(request, folder, claimed_s)
+
+
+def _work(request: Request, folder: RunFolder, claimed_s: float) -> RunRecord:
+    """All stages, and what the user keeps of them."""
+    start, machine = perf_counter() - claimed_s, describe_machine()
     where, chosen = request.store, request.configuration
     where.serve(folder.path)
 
@@ -95,7 +109,7 @@ def reconstruct(
     )
     name = request.scene.description.name
     scores = score_views(
-        *(where, name, seed, views, trained, clip, evaluation, bodies),
+        *(where, name, request.seed, views, trained, clip, evaluation, bodies),
         *(chosen.evaluation, chosen.person_scores, chosen.truth),
     )
 

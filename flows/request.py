@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.allowed_addresses import require_allowed_address
 from flows.allowed_folders import AllowedFolders
 from flows.demo_scene import named_demo
 from flows.imported_scene import scene_folder
@@ -83,13 +84,15 @@ class Request(BaseModel):
         until = () if self.until is None else (read_target(self.until),)
         preset = PRESETS[self.preset]()
         chosen = with_settings(preset, (*self.settings, *budget, *until))
-        require_sense(chosen, preset)
         self._allowed.check_files(chosen)
+        require_sense(chosen, preset)
         return chosen
 
     @cached_property
     def processes(self) -> Devices:
         """What the optimisation runs on; its result is the same, but for rounding."""
+        if self.rendezvous is not None:
+            require_allowed_address(self.rendezvous, "rendezvous")
         return choose_devices(self.devices, self.machines, self.rendezvous)
 
     @cached_property

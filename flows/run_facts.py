@@ -18,7 +18,7 @@ from mocoflow_core.artifacts import (
 )
 from mocoflow_core.io.run_folder import RunRecord, StageRecord
 from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
-from mocoflow_core.report.markdown_text import code, plain, unlinked
+from mocoflow_core.report.markdown_text import code, file_link, plain, unlinked_rows
 
 # What rendering the run again needs to know of its clip.
 CAPTURE = ("fps", "source_fps", "first_frame", "last_frame", "up")
@@ -71,17 +71,15 @@ def records(stages: Iterable[Artifact]) -> tuple[StageRecord, ...]:
 def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
     """On the run's page: the scores, the error curve, the stages and a link to the report."""
     rows = [
-        {"method": method, "camera": unlinked(camera), **metrics}
+        {"method": method, "camera": camera, **metrics}
         for method, cameras in record.scores.items()
         for camera, metrics in cameras.items()
     ]
     scene = plain(record.scene)
-    create_table_artifact(rows, key="scores", description=f"Mean scores of {scene}")
+    create_table_artifact(unlinked_rows(rows), key="scores", description=f"Mean scores of {scene}")
     curve = "\n".join([f"# {scene}", "", *_embedded(picture)])
     create_markdown_artifact(curve, key="error-curve", description="Error against run time")
-    address = report.resolve().as_uri().replace("~", "%7E")  # Two of them would strike through.
-    link = f"[Report]({address}): {code(str(report))}"
-    lines = [f"# {scene}", "", link, ""]
+    lines = [f"# {scene}", "", f"{file_link('Report', report)}: {code(str(report))}", ""]
     lines += ["| stage | seconds | CPU seconds | |", "|-|-|-|-|"]
     lines += [
         f"| {s.name} | {s.wall_s:.1f} | {s.cpu_s:.1f} | {'from the store' if s.cached else ''} |"
@@ -95,7 +93,7 @@ def show_in_prefect(record: RunRecord, report: Path, picture: Path) -> None:
 def show_benchmark_in_prefect(record: BenchmarkRecord, page: Path, chart: Path) -> None:
     """On the benchmark's page: the scores, the chart, what is missing and where the page lies."""
     asked = code(record.command)
-    rows = [{**row, "scene": unlinked(str(row["scene"]))} for row in record.summary]
+    rows = unlinked_rows(record.summary)
     create_table_artifact(rows, key="benchmark-scores", description=asked)
     lines = ["# Error against run time", "", code(str(page)), "", *_embedded(chart)]
     lines += [asked, *_listed("worse than usual", record.regressions)]

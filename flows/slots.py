@@ -1,6 +1,6 @@
 """Slots of a machine, such as its GPUs, as a global concurrency limit of the Prefect server.
 
-Benchmarks and deployed runs that name the same limit share its slots.
+Cells of benchmarks and runs of one scene that name the same limit share its slots.
 """
 
 from __future__ import annotations

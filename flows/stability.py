@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from prefect import flow
 from prefect.artifacts import create_table_artifact
@@ -10,11 +11,12 @@ from prefect.artifacts import create_table_artifact
 from flows.allowed_folders import AllowedFolders
 from flows.results_folders import folder_of_this_run
 from mocoflow_core.errors import InputError
-from mocoflow_core.stability.catalogue import cases_of, require_areas
+from mocoflow_core.stability.catalogue import AREAS, cases_of, require_areas
 from mocoflow_core.stability.table import StabilityRow, Summary, summarise
 from tasks.check_stability import check_stability
 from tasks.write_stability import write_stability
 
+Area = Literal[tuple(AREAS)]
 TABLE = "stability.parquet"
 
 
@@ -24,7 +26,7 @@ class CasesFailed(RuntimeError):
 
 @flow(name="stability", validate_parameters=True)
 def stability(
-    out: Path | None = None, areas: tuple[str, ...] = (), quick_only: bool = False
+    out: Path | None = None, areas: tuple[Area, ...] = (), quick_only: bool = False
 ) -> Summary:
     """Measure the cases of some areas, or of all, and write what came out.
 
@@ -35,7 +37,7 @@ def stability(
         quick_only: leave out the cases that train scenes.
 
     Raises:
-        InputError: an unknown area, or a folder that holds something else.
+        InputError: a folder that holds something else.
         CasesFailed: after everything is written, where a case failed.
     """
     named = [area for area in require_areas(areas) if cases_of(area, quick_only)]

@@ -1,4 +1,4 @@
-"""Options that say what the cells of a benchmark run on."""
+"""Options that say what runs and the cells of a benchmark run on."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ import typer
 CellWorkers = typer.Option(help="Processes that run cells at once, with their share of the cores.")
 DaskAddress = typer.Option(
     metavar="ADDRESS", help="Scheduler of a Dask cluster that runs the cells: tcp://HOST:8786."
+)
+SlotsOfServer = typer.Option(
+    metavar="NAME",
+    help="Global concurrency limit of the Prefect server that the run holds one slot of.",
 )
 Slots = typer.Option(
     metavar="NAME",

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 
 from pydantic import BaseModel, ConfigDict
 
+from flows.allowed_addresses import require_allowed_address
 from mocoflow_core.errors import InputError
 
 
@@ -36,6 +37,7 @@ class Workers(BaseModel):
                 f"--workers {self.count} --dask {self.dask}",
                 "Leave one out; the cluster has its own workers.",
             )
+        require_allowed_address(self.dask, "dask")
         if find_spec("prefect_dask") is None:
             raise InputError(
                 "--dask needs prefect-dask",

@@ -10,6 +10,7 @@ from uuid import UUID
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import TaskRunContext
 
+from mocoflow_core.report.markdown_text import plain
 from tasks.cancellation import end_if_cancelled
 from tasks.server import if_the_server_answers
 from tasks.terminal_bar import Progress, terminal_bar
@@ -52,7 +53,7 @@ class ProgressArtifact:
 
     def update(self, fraction: float, text: str) -> None:
         percent = 100.0 * min(max(fraction, 0.0), 1.0)
-        description = f"{self._stage}: {text}"
+        description = f"{self._stage}: {plain(text)}"
         if self._id is None:
             key = self._stage.replace("_", "-")
             created = create_progress_artifact(percent, key=key, description=description)

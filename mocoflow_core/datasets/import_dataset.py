@@ -12,6 +12,7 @@ from mocoflow_core.datasets.dataset_scene import DatasetScene
 from mocoflow_core.datasets.kinds import DatasetKind
 from mocoflow_core.datasets.write_dataset import require_new, write_dataset
 from mocoflow_core.errors import InputError
+from mocoflow_core.named_files import require_networks
 from mocoflow_core.settings import with_settings
 
 Progress = Callable[[float, str], None]
@@ -79,6 +80,7 @@ def import_dataset(
     Raises InputError as the reader and the checks do, for a folder with content, and a full disk.
     """
     require_new(out)
+    require_networks(configuration)
     scene = _read(kind, source, configuration, progress)
     findings = check_dataset(scene)
     imported = ImportedDataset(

@@ -25,8 +25,9 @@ def own_lpips_weights(file: FileOfNetwork) -> Weights:
     """The tensors that ``LpipsAlex`` takes: an AlexNet with its heads, or with the official ones.
 
     Raises:
-        InputError: another network, other sizes, or numbers that are not finite.
+        InputError: no file, another network, other sizes, or numbers that are not finite.
     """
+    file.require()
     official = embedded_weights("lpips_alex").tensors
     if file.path.suffix.lower() == ".safetensors":
         tensors = read_weights(file.path).tensors

@@ -44,6 +44,7 @@ def _giving(needed: str, file: FileOfNetwork) -> InstanceNetwork:
 
 def _network(file: FileOfNetwork) -> InstanceNetwork:
     """ONNX by its suffix, else weights of torchvision."""
+    file.require()
     if file.path.suffix.lower() == ".onnx":
         return OnnxNetwork(file.path)
     return TorchvisionNetwork(file.path)

@@ -11,6 +11,7 @@ from prefect.events.schemas.automations import AutomationCore
 from prefect.exceptions import ParameterTypeError
 from prefect.flows import load_flow_from_entrypoint
 from prefect.schedules import Cron
+from prefect.utilities.schema_tools.validation import validate
 
 from flows.data_set_roots import ROOTS
 from flows.regression_event import EVENT
@@ -98,13 +99,52 @@ def test_a_data_set_is_paused_and_says_what_it_waits_for(name):
         ("flows.reconstruct.reconstruct", {"settings": ["no value"]}),
         ("flows.reconstruct.reconstruct", {"until": "psnr=30"}),
         ("flows.benchmark.benchmark", {"seeds": 0}),
+        ("flows.reconstruct.reconstruct", {"rendezvous": "gpu0"}),
         ("flows.benchmark.benchmark", {"presets": ["turbo"]}),
+        ("flows.benchmark.benchmark", {"methods": ["magic"]}),
+        ("flows.benchmark.benchmark", {"experiment": "magic"}),
+        ("flows.benchmark.benchmark", {"targets": ["psnr"]}),
+        ("flows.benchmark.benchmark", {"targets": ["beauty=1"]}),
+        ("flows.benchmark.benchmark", {"workers": 0}),
+        ("flows.benchmark.benchmark", {"workers": 10**6}),
+        ("flows.benchmark.benchmark", {"dask": "somewhere"}),
+        ("flows.benchmark.benchmark", {"slots": ""}),
+        ("flows.stability.stability", {"areas": ["weather"]}),
     ],
     ids=lambda value: str(value),
 )
 def test_a_parameter_out_of_its_bounds_is_no_valid_one(entrypoint, parameters):
+    flow = load_flow_from_entrypoint(entrypoint)
     with pytest.raises(ParameterTypeError):
-        load_flow_from_entrypoint(entrypoint).validate_parameters(parameters)
+        flow.validate_parameters(parameters)
+    assert refused_by_the_server(flow, parameters)
+
+
+@pytest.mark.parametrize(
+    ("entrypoint", "parameters"),
+    [
+        ("flows.reconstruct.reconstruct", {"machines": 2, "rendezvous": "gpu0:29400"}),
+        ("flows.reconstruct.reconstruct", {"rendezvous": "[fd00::1]:29400", "until": None}),
+        ("flows.benchmark.benchmark", {"methods": ["mocoflow", "without_box", "posed_mesh"]}),
+        ("flows.benchmark.benchmark", {"methods": ["base", "with_moco"], "experiment": None}),
+        ("flows.benchmark.benchmark", {"methods": [], "experiment": "misalignment"}),
+        ("flows.benchmark.benchmark", {"targets": [" psnr_union = +2e1 ", "lpips_alex=.1"]}),
+        ("flows.benchmark.benchmark", {"dask": "127.0.0.1:8786", "slots": "GPU 0"}),
+        ("flows.benchmark.benchmark", {"dask": "tls://[::1]:8786"}),
+        ("flows.stability.stability", {"areas": ["se3", "mesh"]}),
+    ],
+    ids=lambda value: str(value),
+)
+def test_what_a_command_line_takes_is_valid(entrypoint, parameters):
+    flow = load_flow_from_entrypoint(entrypoint)
+    flow.validate_parameters(parameters)
+    assert not refused_by_the_server(flow, parameters)
+
+
+def refused_by_the_server(flow, parameters):
+    """What the server finds wrong before it makes a run."""
+    schema = flow.parameters.model_dump()
+    return validate(parameters, schema, ignore_required=True, allow_none_with_default=True)
 
 
 def test_the_automation_can_be_read_and_outlasts_some_heartbeats():

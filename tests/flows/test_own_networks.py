@@ -13,6 +13,8 @@ from safetensors.torch import save_file
 
 from flows.command_line import main
 from flows.request import Request
+from mocoflow_core.datasets.import_dataset import configure, import_dataset
+from mocoflow_core.datasets.kinds import KINDS
 from mocoflow_core.errors import InputError
 from mocoflow_core.metrics.person_judge import open_networks
 from mocoflow_core.perception.embedded import FOLDER
@@ -88,5 +90,13 @@ def test_a_wrong_file_is_one_line_before_any_work(monkeypatch, capsys, tmp_path,
 
 
 def test_a_path_to_nothing_names_the_field(toy_scene):
-    with pytest.raises(InputError, match=r"person_scores\.lpips must be valid.*nothing at"):
+    with pytest.raises(InputError, match=r"person_scores\.lpips must be .*nothing at"):
         _ = request(toy_scene, "person_scores.lpips=/nowhere/alex.pth").configuration
+
+
+def test_an_import_names_the_field_too(tmp_path):
+    (tmp_path / "film.mp4").write_bytes(b"no film")
+    video = KINDS["video"]
+    chosen = configure(video, ("segmenter=/nowhere/mask.onnx",), None)
+    with pytest.raises(InputError, match=r"segmenter must be .*nothing at"):
+        import_dataset(video, tmp_path / "film.mp4", chosen, tmp_path / "scene")

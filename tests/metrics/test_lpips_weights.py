@@ -28,7 +28,7 @@ def as_torchvision(scale: float = 1.0) -> dict[str, torch.Tensor]:
 
 
 def opened(path: Path) -> LpipsAlex:
-    return LpipsAlex(own_lpips_weights(FileOfNetwork.of(path)))
+    return LpipsAlex(own_lpips_weights(FileOfNetwork(path)))
 
 
 def distances(lpips: LpipsAlex) -> float:

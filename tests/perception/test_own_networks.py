@@ -21,7 +21,7 @@ from mocoflow_core.perception.own_networks import (
 )
 
 GRAPHS = Path(__file__).parents[1] / "data" / "detectors"
-MASK, KEYPOINT = (FileOfNetwork.of(GRAPHS / f"{name}.onnx") for name in ("mask", "keypoint"))
+MASK, KEYPOINT = (FileOfNetwork(GRAPHS / f"{name}.onnx") for name in ("mask", "keypoint"))
 # The input's shape in the file: three lengths; two of them and an axis without a length.
 FIXED = b"\n\x02\x08\x03\n\x02\x08\x40\n\x02\x08\x40"
 ANY = FIXED[:-2] + b"\x12\x00"
@@ -97,7 +97,7 @@ def test_a_network_for_something_else_is_refused(opening, file, line):
 
 
 def of(path: Path) -> FileOfNetwork:
-    return FileOfNetwork.of(path)
+    return FileOfNetwork(path)
 
 
 def text(path: Path) -> None:
@@ -130,7 +130,9 @@ def test_another_file_is_refused_in_one_line(tmp_path, name, write, line):
 
 def test_no_file_is_refused():
     with pytest.raises(InputError, match="nothing at"):
-        of(Path("nowhere.onnx"))
+        _ = of(Path("nowhere.onnx")).digest
+    with pytest.raises(InputError, match=r"nowhere\.onnx"):
+        own_person_detector(of(Path("nowhere.onnx")))
 
 
 def test_arrays_of_another_network_are_refused():
