@@ -15,6 +15,7 @@ from flows.preparation import prepare
 from flows.request import Request
 from flows.results_folders import folder_of_this_run
 from flows.run_facts import describe_run, records, show_in_prefect
+from flows.user_folders import this_machine
 from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.presets import Preset
@@ -78,7 +79,7 @@ def reconstruct(
     )
     folder = request.claim(out or folder_of_this_run())
     where, chosen = request.store, request.configuration
-    where.serve(folder.path)
+    where.serve(folder.path, this_machine())
 
     prepared = prepare(request)
     show_plan(request, prepared.plan)
