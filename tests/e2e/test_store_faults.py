@@ -18,6 +18,8 @@ from tests.object_storage import object_storage
 
 pytestmark = pytest.mark.faults
 
+DAY_S = 86400.0
+
 
 def computed(run):
     return [stage.name for stage in read_run(run).stages if not stage.cached]
@@ -195,7 +197,13 @@ def test_an_upload_of_many_parts_that_is_killed_is_never_seen_and_cleaned_up(sto
     access = storage.environment | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
     said = done("store", "verify", *url, environment=access)
     assert "left by an upload that was cut off" in said
-    done("store", "gc", *url, "--delete", environment=access)
+    collect = ("store", "gc", *url, "--delete")
+    for seconds_ago, options in ((600.0, ("--older-than", 0)), (6 * DAY_S, ())):
+        with storage.uploads_begun(seconds_ago):
+            done(*collect, *options, environment=access)
+        assert files.list_multipart_uploads("multipart")
+    with storage.uploads_begun(8 * DAY_S):
+        done(*collect, environment=access)
     assert files.list_multipart_uploads("multipart") == []
     subprocess.run(words, env=environment, check=True)  # The same machine uploads what it has.
     assert "Nothing is damaged." in done("store", "verify", *url, environment=access)
