@@ -107,7 +107,7 @@ class FolderHoldings:
                 for path in _beside(folder):
                     shutil.rmtree(path) if path.is_dir() else path.unlink()
             elif folder.is_dir():
-                if self._artifact(folder).used_at > held.used_at:
+                if _used_at(folder) > held.used_at:
                     return False
                 if not _clear_unless(needed, folder):
                     return False
@@ -136,8 +136,7 @@ class FolderHoldings:
         return Held(
             name=f"{folder.parent.name}/{folder.name}",
             size=_measure([folder])[0],
-            # Finding an artifact touches its manifest.
-            used_at=_measure([folder / MANIFEST if manifest else folder])[1],
+            used_at=_used_at(folder),
             wall_s=manifest.wall_s if manifest else None,
             fault=fault_of(folder, thorough=False),
         )
@@ -153,6 +152,11 @@ class FolderHoldings:
             leftover=True,
             busy=busy,
         )
+
+
+def _used_at(folder: Path) -> float:
+    """Finding an artifact touches its manifest."""
+    return _measure([folder / MANIFEST if Manifest.read(folder) else folder])[1]
 
 
 def _clear_unless(needed: Callable[[], bool], folder: Path) -> bool:
