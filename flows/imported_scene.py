@@ -53,7 +53,7 @@ def scene_folder(
         return path
     from mocoflow_core.datasets.detect import kind_of
     from mocoflow_core.datasets.import_cache import import_once, place_of_import
-    from tasks.terminal_bar import terminal_bar
+    from tasks.progress import showing_progress
 
     kind = kind_of("auto", path)
     said = video or (choices(kind, import_settings, body_model) if import_settings else None)
@@ -65,7 +65,7 @@ def scene_folder(
         return folder
     typer.echo(f"{path} is {kind.name}: imported into {folder}", err=True)
     try:
-        with terminal_bar(f"import {path.name}") as progress:
+        with showing_progress("import") as progress:
             imported = import_once(kind, path, configuration, folder, progress)
         tell(imported)
     except InputError as error:

@@ -16,6 +16,7 @@ from flows.request import Request
 from flows.results_folders import folder_of_this_run
 from flows.run_facts import describe_run, records, show_in_prefect
 from flows.slots import held_slot, require_slots
+from flows.user_folders import this_machine
 from mocoflow_core.io.machine import describe_machine
 from mocoflow_core.io.run_folder import RunFolder, RunRecord
 from mocoflow_core.presets import Preset
@@ -92,7 +93,7 @@ def _work(request: Request, folder: RunFolder, claimed_s: float) -> RunRecord:
     """All stages, and what the user keeps of them."""
     start, machine = perf_counter() - claimed_s, describe_machine()
     where, chosen = request.store, request.configuration
-    where.serve(folder.path)
+    where.serve(folder.path, this_machine())
 
     prepared = prepare(request)
     show_plan(request, prepared.plan)

@@ -93,5 +93,5 @@ def reason_of(error: BaseException) -> str:
 def _is_finished(cell: Cell) -> bool:
     try:
         return cell.request.claim(cell.out).is_finished()
-    except InputError:
+    except Exception:
         return False  # Its own flow run will say why.

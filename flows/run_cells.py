@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from flows.benchmark_request import Cell
+from flows.cell_task import failed
 from flows.process_workers import run_in_processes
 from flows.run_cell import run_cell
 from flows.slots import require_slots
@@ -25,5 +26,13 @@ def run_cells(cells: Iterable[Cell], workers: Workers) -> tuple[CellRecord, ...]
     if workers.slots:
         require_slots(workers.slots)
     if workers.count == 1:
-        return tuple(run_cell(cell, workers.slots) for cell in cells)
+        return tuple(_run_here(cell, workers.slots) for cell in cells)
     return run_in_processes(cells, workers.count, workers.slots)
+
+
+def _run_here(cell: Cell, slots: str | None) -> CellRecord:
+    """Whatever goes wrong is this cell's failure; only what ends the process ends the others."""
+    try:
+        return run_cell(cell, slots)
+    except Exception as error:
+        return failed(cell, error)

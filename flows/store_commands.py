@@ -12,6 +12,7 @@ import typer
 from flows.list_options import ListOptions
 
 if TYPE_CHECKING:
+    from mocoflow_core.io.garbage import Sentence
     from mocoflow_core.io.holdings import Holdings
     from mocoflow_core.io.known_runs import KnownRun
 
@@ -36,11 +37,12 @@ RunFolders = Annotated[
 def list_artifacts(store: Address = None, runs: RunFolders = None) -> None:
     """List artifacts: age since last use, size, seconds of work, who needs them, what is broken."""
     from flows.store_table import artifact_table, summary
+    from flows.user_folders import this_machine
     from mocoflow_core.io.garbage import users
 
-    now = time.time()
+    now, machine = time.time(), this_machine()
     places = _places(store)
-    needed = users(_known(places, runs))
+    needed = users([*_known(places), *_below(runs, machine)], machine)
     for place in places:
         held = place.look()
         typer.echo(f"{place.place}: {summary(held)}")
@@ -87,22 +89,33 @@ def collect_garbage(
 ) -> None:
     """Say what no run needs any more, and with --delete remove it."""
     from flows.store_table import garbage_table, size
-    from mocoflow_core.io.garbage import judge, users
+    from flows.user_folders import this_machine
+    from mocoflow_core.io.garbage import is_needed, judge, users
 
-    places = _places(store)
-    known = _known(places, runs)
-    for run in (run for run in known if not run.is_kept()):
+    places, machine = _places(store), this_machine()
+    elsewhere = _below(runs, machine)
+    gone = [run for run in _known(places) if not run.is_kept(machine)]
+    for run in gone:
         typer.echo(f"no longer there: the run in {run.folder}")
+
+    def known() -> list[KnownRun]:
+        return [*_known(places), *elsewhere]
+
+    def removed(place: Holdings, going: Sentence) -> bool:
+        return place.remove(going.held, lambda: is_needed(going, known(), machine))
+
     freed = 0
     for place in places:
         least_s = max(older_than * DAY_S, place.least_age_s)
-        sentences = judge(place.look(), users(known), least_s, time.time())
+        held = place.look()
+        # Not before: what the look has found may be in a record that was just written.
+        sentences = judge(held, users(known(), machine), least_s, time.time())
         for line in garbage_table(place.place, sentences):
             typer.echo(line)
-        going = [sentence.held for sentence in sentences if sentence.goes]
-        freed += sum(held.size for held in going if not delete or place.remove(held))
-        for run in known if delete else ():
-            if not run.is_kept():
+        going = [sentence for sentence in sentences if sentence.goes]
+        freed += sum(s.held.size for s in going if not delete or removed(place, s))
+        for run in gone if delete else ():
+            if not run.is_kept(machine):
                 place.forget(run)
     typer.echo(f"{size(freed)} freed." if delete else f"{size(freed)} can go: add --delete.")
 
@@ -114,8 +127,13 @@ def _places(store: str | None) -> tuple[Holdings, ...]:
     return holdings_of(open_users_store(store))
 
 
-def _known(places: Sequence[Holdings], folders: list[Path] | None) -> list[KnownRun]:
-    """The runs that the store knows of, and those below the given folders."""
+def _known(places: Sequence[Holdings]) -> list[KnownRun]:
+    """The runs that the store knows of by now."""
+    return [run for place in places for run in place.runs()]
+
+
+def _below(folders: list[Path] | None, machine: str) -> list[KnownRun]:
+    """The runs below the given folders."""
     from mocoflow_core.io.known_runs import runs_below
 
-    return [*(run for place in places for run in place.runs()), *runs_below(folders or ())]
+    return runs_below(folders or (), machine)

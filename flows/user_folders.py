@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from mocoflow_core.io.machine import machine_id
+
 
 def cache_folder() -> Path:
     """mocoflow's folder in the user's cache (``XDG_CACHE_HOME``, by default ``~/.cache``)."""
@@ -25,6 +27,13 @@ def results_folder() -> Path:
 def data_folder() -> Path:
     """Where scenes of deployed runs lie when their worker is told no other place."""
     return _data_folder() / "data"
+
+
+def this_machine() -> str:
+    """What tells this machine from others (``XDG_STATE_HOME``, by default ``~/.local/state``)."""
+    state = os.environ.get("XDG_STATE_HOME")
+    folder = Path(state) if state else Path.home() / ".local" / "state"
+    return machine_id(folder / "mocoflow" / "machine-id")
 
 
 def _data_folder() -> Path:

@@ -31,11 +31,13 @@ def extract_clip(
     """
     scene = open_scene(recording.path, recording.train_camera)
     only = bodies and frames_that_show(work.open(bodies), scene, capture.least_shown)
-    extracted = extract.extract_clip(scene, capture, needs, only)
+    progress = work.part(0.0, extract.EXTRACTING)
+    extracted = extract.extract_clip(scene, capture, needs, only, progress)
     sound, warnings = sound_clip(extracted, capture.difference_threshold)
     mask_files = {} if needs.masks else scene.masks(scene.train_camera)
     behind_person = capture.behind(scene)
-    clip = composite_clip(scene, sound, behind_person, mask_files)
+    composing = work.part(extract.EXTRACTING, 1.0)
+    clip = composite_clip(scene, sound, behind_person, mask_files, composing)
     selected, every = (
         len(extract.select_training_frames(scene, capture, some).all) for some in (only, None)
     )

@@ -34,7 +34,7 @@ def extract_evaluation(
     scene = open_scene(recording.path, recording.train_camera)
     frame_indices = Clip.load(work.open(clip)).frame_indices
     only = bodies and frames_that_show(work.open(bodies), scene, least_shown)
-    clips = extract.extract_evaluation(scene, frame_indices, capture, only)
+    clips = extract.extract_evaluation(scene, frame_indices, capture, only, work.progress)
     for seen in clips:
         (work.folder / seen.camera.name).mkdir()
         seen.save(work.folder / seen.camera.name)

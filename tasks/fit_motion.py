@@ -50,6 +50,7 @@ def fit_motion(
         decided.shell_width_m,
         decided.needs("motion_fields"),
         motion,
+        work.progress,
     )
     start.save(work.folder)
     return asdict(start.fit)

@@ -30,7 +30,8 @@ def ingest_meshes(
     chosen = estimate.with_files(
         body_model.path if body_model else None, faces.path if faces else None
     )
-    ingested = ingest.ingest_meshes(scene, meshes.path if meshes else None, chosen)
+    path = meshes.path if meshes else None
+    ingested = ingest.ingest_meshes(scene, path, chosen, work.progress)
     ingested.save(work.folder)
     return {
         "coordinates": ingested.coordinates,

@@ -30,5 +30,5 @@ def misplace_views(
     the same scene that metrics read.
     """
     scene = open_scene(recording.path, recording.train_camera)
-    rows = misplaced_view_rows(scene, name, capture, evaluation, person)
+    rows = misplaced_view_rows(scene, name, capture, evaluation, person, work.progress)
     return {"rows": [row._asdict() for row in rows]}

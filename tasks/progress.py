@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from uuid import UUID
 
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
-from prefect.context import TaskRunContext
+from prefect.context import FlowRunContext, TaskRunContext
 
 from mocoflow_core.report.markdown_text import plain
 from tasks.cancellation import end_if_cancelled
@@ -20,13 +20,16 @@ SECONDS_BETWEEN_UPDATES = 5.0
 
 
 @contextmanager
-def showing_progress(stage: str, note_time: Callable[[], None]) -> Iterator[Progress]:
-    """A callback (fraction in [0, 1], short text) for the body of a stage.
+def showing_progress(
+    stage: str, note_time: Callable[[], None] = lambda: None
+) -> Iterator[Progress]:
+    """A callback (fraction in [0, 1], short text) for the body of a stage, or of a run's import.
 
     ``note_time`` is called now and then, so that a killed stage knows what it has cost. Raises
     RunCancelled out of the callback when somebody has cancelled the flow run.
     """
-    artifact = ProgressArtifact(stage) if TaskRunContext.get() else None
+    shown = TaskRunContext.get() or FlowRunContext.get()
+    artifact = ProgressArtifact(stage) if shown else None
     updated = time.monotonic()
     with terminal_bar(stage) as show:
 

@@ -22,6 +22,7 @@ from mocoflow_core.artifacts import Artifact
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.store import Store
+from mocoflow_core.progress import part_of
 from mocoflow_core.threads import torch_threads
 from tasks.progress import Progress, showing_progress
 from tasks.source import Source
@@ -56,7 +57,7 @@ class Stage:
 
     def part(self, start: float, end: float) -> Progress:
         """Progress of a part of the stage that spans these fractions of the whole."""
-        return lambda fraction, text: self.progress(start + fraction * (end - start), text)
+        return part_of(self.progress, start, end)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ atexit.register(shutil.rmtree, HOME, ignore_errors=True)
 # Prefect reads its settings when it is imported.
 os.environ |= {
     "XDG_CACHE_HOME": f"{HOME}/cache",
+    "XDG_STATE_HOME": f"{HOME}/state",
     "PREFECT_HOME": f"{HOME}/prefect",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
     "DO_NOT_TRACK": "1",

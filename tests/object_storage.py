@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from unittest import mock
 
 import s3fs
+from moto.s3.responses import S3Response
 from moto.server import ThreadedMotoServer
 
+# When moto says that every upload of several parts has begun.
+MOTOS_DATE = "2010-11-10T20:48:33.000Z"
 ACCESS = {"AWS_ACCESS_KEY_ID": "tests", "AWS_SECRET_ACCESS_KEY": "tests"}
 
 
@@ -34,6 +40,21 @@ class ObjectStorage:
             use_listings_cache=False,
             skip_instance_cache=True,
         )
+
+    @contextmanager
+    def uploads_begun(self, seconds_ago: float) -> Iterator[None]:
+        """The server says so of every upload that is open."""
+        begun = datetime.fromtimestamp(time.time() - seconds_ago, UTC)
+        dated = begun.strftime("%Y-%m-%dT%H:%M:%S.000Z")
+        listed = S3Response.list_multipart_uploads
+
+        def answer(response: S3Response):
+            status, headers, body = listed(response)
+            assert body.count(MOTOS_DATE) == body.count("<Upload>")
+            return status, headers, body.replace(MOTOS_DATE, dated)
+
+        with mock.patch.object(S3Response, "list_multipart_uploads", answer):
+            yield
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from torch import Tensor
 from mocoflow_core.body.smpl_model import SmplModel
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.se3 import exp_se3
+from mocoflow_core.progress import Progress, untold
 
 # Frames are taken in portions whose per-vertex transforms fit into this.
 PORTION_BYTES = 64 * 2**20
@@ -29,6 +30,7 @@ def posed_vertices(
     translation: ArrayLike | None = None,
     offsets: ArrayLike | None = None,
     pose_directions: bool = True,
+    progress: Progress = untold,
 ) -> NDArray[np.floating]:
     """Vertices of the body in each frame.
 
@@ -57,6 +59,7 @@ def posed_vertices(
     directions = _flat_directions(model) if pose_directions else None
     for portion in _portions(len(result), model):
         result[portion] = _skinned(model, body.frames(portion), extra, directions).numpy()
+        progress(min(portion.stop / len(result), 1.0), "posing bodies")
     return result
 
 

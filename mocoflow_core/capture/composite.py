@@ -20,6 +20,7 @@ from mocoflow_core.capture.scene_description import BehindPerson
 from mocoflow_core.capture.strange_frames import listed
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.capture.working_pictures import source_mask
+from mocoflow_core.progress import Progress, untold
 
 Picture = NDArray[np.uint8]
 WHITE = 255
@@ -28,7 +29,11 @@ RIM_PX = 1
 
 
 def composite_clip(
-    scene: Scene, clip: Clip, behind: BehindPerson, mask_files: dict[int, Path]
+    scene: Scene,
+    clip: Clip,
+    behind: BehindPerson,
+    mask_files: dict[int, Path],
+    progress: Progress = untold,
 ) -> Clip:
     """The clip with what is behind the person replaced, in its frames and as its background.
 
@@ -60,6 +65,7 @@ def composite_clip(
         if clip.has_mask[row]:
             rest = (1 - coverage[..., None] / 255) * background
             frames[row] = np.clip(np.rint(person + rest), 0, 255)
+        progress((row + 1) / len(frames), f"frame {clip.frame_indices[row]} cut out")
     return replace(clip, frames=frames, background=background, remarks=clip.remarks + unknown)
 
 

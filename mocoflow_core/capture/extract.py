@@ -26,9 +26,15 @@ from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.capture.working_pictures import working_frames, working_masks, working_plate
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
+from mocoflow_core.progress import Progress, part_of, untold
 
 Indices = NDArray[np.int32]
 Masks = NDArray[np.bool_]
+
+# About the share of the time that goes into a camera's clip before it is composited, and of that
+# into its frames before its masks.
+EXTRACTING = 0.7
+DECODING = 0.8
 
 
 class CaptureConfig(ConfigurationPart):
@@ -91,6 +97,7 @@ def extract_clip(
     configuration: CaptureConfig,
     needs: ClipNeeds = AS_FILES_SAY,
     only: Indices | None = None,
+    progress: Progress = untold,
 ) -> Clip:
     """The train camera's clip as the camera saw it. No other camera and no truth is looked at.
 
@@ -103,7 +110,7 @@ def extract_clip(
     Raises InputError when frames or masks are missing, and when sizes disagree.
     """
     selection = select_training_frames(scene, configuration, only)
-    clip = extract_camera(scene, scene.train_camera, selection, configuration, needs)
+    clip = extract_camera(scene, scene.train_camera, selection, configuration, needs, progress)
     if not needs.repeated_frames:
         clip = clip.at_rows(~repeated_frames(clip.frames, clip.masks, ~clip.held_out))
     if not clip.masks.any():
@@ -120,6 +127,7 @@ def extract_evaluation(
     frame_indices: Indices,
     configuration: CaptureConfig,
     only: Indices | None = None,
+    progress: Progress = untold,
 ) -> list[Clip]:
     """The other cameras' clips: those of the given frames that have a mask to score against.
 
@@ -129,14 +137,18 @@ def extract_evaluation(
     clips = []
     if only is not None:
         frame_indices = np.intersect1d(frame_indices, only).astype(np.int32)
-    for name in scene.evaluation_cameras:
+    for number, name in enumerate(scene.evaluation_cameras):
+        cameras = len(scene.evaluation_cameras)
+        told = part_of(progress, number / cameras, (number + 1) / cameras)
         masked = np.array(sorted(scene.masks(name)), np.int32)
         scored = np.intersect1d(np.intersect1d(frame_indices, masked), scene.frames(name).indices)
         if len(scored):
             selection = FrameSelection(scored[:0], scored, scene.description.fps)
-            seen = extract_camera(scene, name, selection, configuration)
-            behind = configuration.behind(scene)
-            clips.append(composite_clip(scene, seen, behind, scene.masks(name)))
+            seen = extract_camera(
+                scene, name, selection, configuration, progress=part_of(told, 0.0, EXTRACTING)
+            )
+            behind, composing = configuration.behind(scene), part_of(told, EXTRACTING, 1.0)
+            clips.append(composite_clip(scene, seen, behind, scene.masks(name), composing))
     return clips
 
 
@@ -175,18 +187,19 @@ def extract_camera(
     selection: FrameSelection,
     configuration: CaptureConfig,
     needs: ClipNeeds = AS_FILES_SAY,
+    progress: Progress = untold,
 ) -> Clip:
     """The selected frames of any camera, with their masks and what is behind the person."""
     indices = selection.all
     view = WorkingView.of(scene.cameras[name], configuration.max_side)
-    frames = working_frames(scene, name, indices, view)
+    frames = working_frames(scene, name, indices, view, part_of(progress, 0.0, DECODING))
     held_out = np.isin(indices, selection.held_out)
     plate, mask_files = working_plate(scene, name, view), scene.masks(name)
     # Held-out frames must not be trained on, and the plate is part of the training.
     usable = np.flatnonzero(~held_out) if len(selection.working) else np.arange(len(indices))
     remarks = []
     if mask_files:
-        masks = working_masks(mask_files, indices, view)
+        masks = working_masks(mask_files, indices, view, part_of(progress, DECODING, 1.0))
     else:
         if plate is None:
             plate, _ = _plate(frames, None, usable, configuration)

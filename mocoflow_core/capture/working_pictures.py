@@ -11,26 +11,31 @@ from mocoflow_core.capture.frame_source import read_image, read_mask
 from mocoflow_core.capture.scene import Scene
 from mocoflow_core.capture.undistort import WorkingView
 from mocoflow_core.errors import InputError
+from mocoflow_core.progress import Progress, untold
 
 Indices = NDArray[np.int32]
 
 
 def working_frames(
-    scene: Scene, name: str, indices: Indices, view: WorkingView
+    scene: Scene, name: str, indices: Indices, view: WorkingView, progress: Progress = untold
 ) -> NDArray[np.uint8]:
     """The frames (T, H, W, 3) of those source numbers. Raises InputError for another size."""
     frames = np.empty((len(indices), view.camera.height, view.camera.width, 3), np.uint8)
     for row, (number, picture) in enumerate(scene.frames(name).read(indices.tolist())):
         require_size(picture, view, f"frame {number} of {name}")
         frames[row] = view.image(picture)
+        progress((row + 1) / len(indices), f"frame {number} of {name}")
     return frames
 
 
-def working_masks(files: dict[int, Path], indices: Indices, view: WorkingView) -> NDArray[np.bool_]:
+def working_masks(
+    files: dict[int, Path], indices: Indices, view: WorkingView, progress: Progress = untold
+) -> NDArray[np.bool_]:
     """Their masks (T, H, W). Raises InputError for another size."""
     masks = np.empty((len(indices), view.camera.height, view.camera.width), bool)
     for row, index in enumerate(indices.tolist()):
         masks[row] = view.mask(source_mask(files[index], view))
+        progress((row + 1) / len(indices), f"mask {index} of {view.camera.name}")
     return masks
 
 

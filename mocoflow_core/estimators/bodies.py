@@ -51,7 +51,7 @@ def modelled(
     """
     model = context.require_model(tool, "SMPL")
     shape, remarks = shapes_of(fitting_shapes(betas, model), context)
-    vertices = posed_vertices(model, pose, shape, translation)
+    vertices = posed_vertices(model, pose, shape, translation, progress=context.progress)
     return Bodies(vertices.astype(np.float32), model.faces.astype(np.int32), remarks)
 
 
@@ -82,7 +82,7 @@ def stored(
     shape, remarks = shapes_of(betas, context)
     if shape.ndim == 1 and not remarks:
         return own
-    bodies = posed_vertices(model, pose, shape)
+    bodies = posed_vertices(model, pose, shape, progress=context.progress)
     bodies = bodies + (middles(vertices) - middles(bodies))[:, None]
     return Bodies(bodies.astype(np.float32), faces, remarks)
 

@@ -15,6 +15,7 @@ from mocoflow_core.capture.scene_description import MeshesDescription
 from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.configuration import EstimateConfig
 from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.progress import Progress, untold
 
 # What tools' bodies are made of, told by its joints.
 JOINTS: dict[Family, int] = {"SMPL": 24, "SMPL-X": 55}
@@ -27,6 +28,7 @@ class EstimateContext:
     camera: Camera
     chosen: EstimateConfig = field(default_factory=EstimateConfig)
     described: MeshesDescription | None = None  # of the scene's meshes
+    progress: Progress = untold
 
     @cached_property
     def model(self) -> SmplModel | None:

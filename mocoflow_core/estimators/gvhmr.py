@@ -38,7 +38,9 @@ def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     track, _ = choose_track([_track(stored)], context.chosen.person)
     model = context.require_model(TOOL, "SMPL-X")
     shape, remarks = shapes_of(track.rows("betas"), context)
-    bodies = posed_vertices(model, _pose(track), shape, track.floats("transl", 3))
+    bodies = posed_vertices(
+        model, _pose(track), shape, track.floats("transl", 3), progress=context.progress
+    )
     vertices, refocus = placed(
         TOOL, bodies.astype(np.float32), _camera(track, context), context.camera
     )

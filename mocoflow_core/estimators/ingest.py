@@ -16,12 +16,14 @@ from mocoflow_core.estimators.configuration import EstimateConfig
 from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.read import read_estimate
+from mocoflow_core.progress import Progress, untold
 
 
 def ingest_meshes(
     scene: Scene,
     meshes_override: Path | None = None,
     chosen: EstimateConfig = EstimateConfig(),  # noqa: B008 - frozen.
+    progress: Progress = untold,
 ) -> IngestedMeshes:
     """Read, check and join the body meshes to the train camera's frames.
 
@@ -38,7 +40,8 @@ def ingest_meshes(
             "none" if path is None else f"no file {path}",
             "Name a mesh file in scene.json, or give one with --meshes.",
         )
-    context = EstimateContext(scene.cameras[scene.train_camera], chosen, scene.description.meshes)
+    camera = scene.cameras[scene.train_camera]
+    context = EstimateContext(camera, chosen, scene.description.meshes, progress)
     estimate = _numbered(read_estimate(path, context), scene)
     return ingest_sequence(
         scene,

@@ -35,6 +35,7 @@ def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
     vertices, faces = read_mesh(files[0])
     bodies = [vertices]
     for file in files[1:]:
+        context.progress(len(bodies) / len(files), file.name)
         others, their_faces = read_mesh(file)
         if others.shape != vertices.shape or not np.array_equal(their_faces, faces):
             raise InputError(

@@ -17,6 +17,7 @@ from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.signed_distance_prior import SignedDistancePrior
 from mocoflow_core.geometry.grid import SparseGrids
 from mocoflow_core.geometry.nearest_rotation import nearest_rotation
+from mocoflow_core.progress import Progress, untold
 
 Array = NDArray[np.float32]
 
@@ -52,6 +53,7 @@ def build_body_motion(
     reach: float,
     configuration: BodyMotionConfig,
     canonical: CanonicalNodes | None = None,
+    progress: Progress = untold,
 ) -> BodyMotion:
     """Blend the controls' rigid motion onto lattices around the body.
 
@@ -76,6 +78,7 @@ def build_body_motion(
         inside, normals = _side_and_normals(nodes, maps[-1], prior)
         distances[-1][inside] *= -1.0
         facing.append(normals)
+        progress((row + 1) / len(controls.times), f"body motion of frame {row + 1}")
     canonical_maps = [
         _node_maps(canonical.nodes, controls.canonical, observed, rotations, canonical.blending)
         for observed, rotations in zip(controls.observed, controls.rotations, strict=True)

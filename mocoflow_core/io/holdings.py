@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from mocoflow_core.io.content_key import KEY_LENGTH
-from mocoflow_core.io.known_runs import RUNS, KnownRun
+from mocoflow_core.io.known_runs import RUNS, KnownRun, RunRecords, is_record
 from mocoflow_core.io.locks import holding, is_held
 from mocoflow_core.io.manifest import MANIFEST, Manifest, fault_of
-from mocoflow_core.io.store import clear_folder, lock_of
+from mocoflow_core.io.store import lock_of
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,19 @@ class Holdings(Protocol):
         """What the digests of an artifact's files show to be wrong, in words."""
         ...
 
-    def remove(self, held: Held) -> bool:
-        """Remove it; ``False`` where it is used by now, and stays."""
+    def remove(self, held: Held, needed: Callable[[], bool]) -> bool:
+        """Remove it; ``False`` where it is used or needed by now, and stays.
+
+        ``needed`` is asked when the artifact is out of sight: whoever uses one writes that down
+        before looking for it, so that it is put back for them, or not yet seen.
+        """
         ...
 
     def runs(self) -> list[KnownRun]:
-        """The runs that have written themselves down here."""
+        """The runs that have written themselves down here.
+
+        Raises InputError for a record that cannot be read.
+        """
         ...
 
     def forget(self, run: KnownRun) -> None:
@@ -75,6 +82,7 @@ class FolderHoldings:
     def __init__(self, root: Path) -> None:
         self.place = str(root)
         self._root = root
+        self._records = RunRecords(self.place, self._read)
 
     def look(self) -> list[Held]:
         held: list[Held] = []
@@ -88,36 +96,47 @@ class FolderHoldings:
     def verify(self, held: Held) -> str | None:
         return fault_of(self._root / held.name)
 
-    def remove(self, held: Held) -> bool:
+    def remove(self, held: Held, needed: Callable[[], bool]) -> bool:
         folder = self._root / held.name
         with holding(lock_of(folder), wait=False) as free:
             if not free:
                 return False
             if held.leftover:
+                if needed():
+                    return False
                 for path in _beside(folder):
                     shutil.rmtree(path) if path.is_dir() else path.unlink()
             elif folder.is_dir():
-                if self._artifact(folder).used_at > held.used_at:
+                if _used_at(folder) > held.used_at:
                     return False
-                clear_folder(folder)
+                if not _clear_unless(needed, folder):
+                    return False
             if not folder.is_dir() and not _beside(folder):
                 lock_of(folder).unlink()
         return True
 
     def runs(self) -> list[KnownRun]:
-        files = sorted((self._root / RUNS).glob("*.json"))
-        return [run for file in files if (run := KnownRun.read(file.read_bytes()))]
+        files = {}
+        for file in (file for file in (self._root / RUNS).glob("*") if is_record(file.name)):
+            with suppress(FileNotFoundError):  # Struck off by somebody else.
+                status = file.stat()
+                files[f"{RUNS}/{file.name}"] = status.st_mtime_ns, status.st_size, status.st_ino
+        return self._records.of(files)
 
     def forget(self, run: KnownRun) -> None:
         (self._root / run.file).unlink(missing_ok=True)
+
+    def _read(self, name: str) -> bytes | None:
+        with suppress(FileNotFoundError):
+            return (self._root / name).read_bytes()
+        return None
 
     def _artifact(self, folder: Path) -> Held:
         manifest = Manifest.read(folder)
         return Held(
             name=f"{folder.parent.name}/{folder.name}",
             size=_measure([folder])[0],
-            # Finding an artifact touches its manifest.
-            used_at=_measure([folder / MANIFEST if manifest else folder])[1],
+            used_at=_used_at(folder),
             wall_s=manifest.wall_s if manifest else None,
             fault=fault_of(folder, thorough=False),
         )
@@ -133,6 +152,27 @@ class FolderHoldings:
             leftover=True,
             busy=busy,
         )
+
+
+def _used_at(folder: Path) -> float:
+    """Finding an artifact touches its manifest."""
+    return _measure([folder / MANIFEST if Manifest.read(folder) else folder])[1]
+
+
+def _clear_unless(needed: Callable[[], bool], folder: Path) -> bool:
+    """Take a folder away, for good unless it is needed; what fails puts it back."""
+    rubbish = folder.with_name(f"{folder.name}.rubbish")
+    shutil.rmtree(rubbish, ignore_errors=True)
+    folder.rename(rubbish)
+    stays = True
+    try:
+        stays = needed()
+    finally:
+        if stays:
+            rubbish.rename(folder)
+    if not stays:
+        shutil.rmtree(rubbish)
+    return not stays
 
 
 def _keyed(stage: Path) -> Iterator[Path]:

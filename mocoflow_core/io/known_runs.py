@@ -8,28 +8,34 @@ from __future__ import annotations
 
 import hashlib
 import socket
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from mocoflow_core.errors import InputError
 from mocoflow_core.io.run_folder import RUN, RunRecord
 
 RUNS = "runs"  # beside the folders of the stages
 
 
 class KnownRun(BaseModel):
-    """One run: its folder, the machine that the folder is on, the artifacts that it has used."""
+    """One run: its folder, the machine that the folder is on, the artifacts that it has used.
+
+    ``host`` is the machine's name, for people; ``machine`` tells it from others, and is empty in
+    records from before there was such a thing.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     folder: str
     host: str
+    machine: str = ""
     artifacts: tuple[str, ...] = ()  # as "<stage>/<key>"
 
     @classmethod
-    def here(cls, folder: Path) -> KnownRun:
-        return cls(folder=str(folder.resolve()), host=socket.gethostname())
+    def here(cls, folder: Path, machine: str) -> KnownRun:
+        return cls(folder=str(folder.resolve()), host=socket.gethostname(), machine=machine)
 
     @classmethod
     def read(cls, content: bytes | None) -> KnownRun | None:
@@ -41,7 +47,8 @@ class KnownRun(BaseModel):
     @property
     def file(self) -> str:
         """Its name in the store: a folder's next run takes the place of its last one."""
-        name = hashlib.sha256(f"{self.host}\0{self.folder}".encode()).hexdigest()[:16]
+        where = f"{self.machine or self.host}\0{self.folder}"
+        name = hashlib.sha256(where.encode()).hexdigest()[:16]
         return f"{RUNS}/{name}.json"
 
     def content(self) -> bytes:
@@ -50,9 +57,52 @@ class KnownRun(BaseModel):
     def using(self, artifacts: Iterable[str]) -> KnownRun:
         return self.model_copy(update={"artifacts": tuple(dict.fromkeys(artifacts))})
 
-    def is_kept(self) -> bool:
+    def is_kept(self, machine: str) -> bool:
         """Whether its folder is still there; nobody here can say that another machine's is not."""
-        return (Path(self.folder) / RUN).is_file() or self.host != socket.gethostname()
+        return self.machine != machine or (Path(self.folder) / RUN).is_file()
+
+
+class RunRecords:
+    """The records of a place; one is read again only where its file has changed.
+
+    Args:
+        place: where the files are, for people.
+        read: the content of a file; ``None`` where it is gone by now.
+    """
+
+    def __init__(self, place: str, read: Callable[[str], bytes | None]) -> None:
+        self._place = place
+        self._read = read
+        self._known: dict[str, tuple[object, KnownRun]] = {}
+
+    def of(self, files: Mapping[str, object]) -> list[KnownRun]:
+        """The runs of files, each given with what changes when it does.
+
+        Raises InputError for a record that cannot be read: what its run needs is not known.
+        """
+        known: dict[str, tuple[object, KnownRun]] = {}
+        for name, stamp in sorted(files.items()):
+            held = self._known.get(name)
+            if held is None or held[0] != stamp:
+                content = self._read(name)
+                if content is None:
+                    continue
+                held = stamp, self._parsed(name, content)
+            known[name] = held
+        self._known = known
+        return [run for _, run in known.values()]
+
+    def _parsed(self, name: str, content: bytes) -> KnownRun:
+        run = KnownRun.read(content)
+        if run is None:
+            raise _unreadable(f"{self._place}/{name}")
+        return run
+
+
+def is_record(name: str) -> bool:
+    """Whether a file below ``runs/`` is a record, and none that is just being written."""
+    last = name.rpartition("/")[2]
+    return last.endswith(".json") and not last.startswith(".")
 
 
 class UseLog:
@@ -86,14 +136,26 @@ class UseLog:
         self._write(self._run.using(self._used))
 
 
-def runs_below(folders: Iterable[Path]) -> list[KnownRun]:
-    """The runs whose folders lie anywhere below the given ones, from what they left there."""
+def runs_below(folders: Iterable[Path], machine: str) -> list[KnownRun]:
+    """The runs whose folders lie anywhere below the given ones, from what they left there.
+
+    Raises InputError for a record that cannot be read.
+    """
     found = []
     for file in (file for folder in folders for file in sorted(folder.rglob(RUN))):
         try:
             record = RunRecord.model_validate_json(file.read_bytes())
-        except (OSError, ValidationError):
-            continue
+        except (OSError, ValidationError) as error:
+            raise _unreadable(str(file)) from error
         used = tuple(f"{stage.name}/{stage.key}" for stage in record.stages)
-        found.append(KnownRun.here(file.parent).model_copy(update={"artifacts": used}))
+        found.append(KnownRun.here(file.parent, machine).using(used))
     return found
+
+
+def _unreadable(file: str) -> InputError:
+    return InputError(
+        "Of every run a record that can be read, to know what is needed",
+        file,
+        "Use the version of mocoflow that wrote it; or remove the file, if its run is of no use "
+        "any more.",
+    )

@@ -1,12 +1,20 @@
-"""What a run ran on; times mean nothing without it."""
+"""What a run ran on; times mean nothing without it. And which machine this is."""
 
 from __future__ import annotations
 
 import os
 import platform
 from pathlib import Path
+from uuid import uuid4
 
 from pydantic import JsonValue
+
+from mocoflow_core.io.content_key import digest_document
+from mocoflow_core.io.locks import holding
+from mocoflow_core.io.whole_file import whole_file
+
+# Missing in many containers, and in others that of their image.
+_SYSTEMS_OWN = Path("/etc/machine-id")
 
 
 def describe_machine() -> dict[str, JsonValue]:
@@ -18,6 +26,31 @@ def describe_machine() -> dict[str, JsonValue]:
         "system": platform.platform(terse=True),
         "python": platform.python_version(),
     }
+
+
+def machine_id(file: Path) -> str:
+    """What tells this machine from others, as names do not: containers change theirs.
+
+    A part is made once and kept in the file, of the user's state; the system's own id tells apart
+    machines that share the user's folders. Where the file cannot be written, the id is nobody's.
+    """
+    try:
+        kept = _made_once(file)
+    except OSError:
+        kept = uuid4().hex
+    systems = _SYSTEMS_OWN.read_text() if _SYSTEMS_OWN.is_file() else ""
+    return digest_document([kept, systems.strip()])[:16]
+
+
+def _made_once(file: Path) -> str:
+    with holding(file.with_name(f"{file.name}.lock")):
+        held = file.read_text().strip() if file.exists() else ""
+        if held:
+            return held
+        made = uuid4().hex
+        with whole_file(file) as beside:
+            beside.write_text(f"{made}\n")
+        return made
 
 
 def _usable_cores() -> int:

@@ -25,6 +25,7 @@ _TIMES = ("LastModified", "last_modified", "mtime", "updated", "created")
 class RemoteFile:
     size: int
     changed_at: float  # seconds of the epoch, by the other side's clock
+    tag: str = ""  # changes with the content, where the store tells one
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,9 @@ class RemoteFiles:
         except FileNotFoundError:
             return {}
         return {
-            path[len(self._base) + 1 :]: RemoteFile(int(facts["size"]), _changed_at(facts))
+            path[len(self._base) + 1 :]: RemoteFile(
+                int(facts["size"]), _changed_at(facts), str(facts.get("ETag", ""))
+            )
             for path, facts in found.items()
         }
 

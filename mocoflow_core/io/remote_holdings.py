@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from mocoflow_core.io.holdings import FolderHoldings, Held, Holdings
-from mocoflow_core.io.known_runs import RUNS, KnownRun
+from mocoflow_core.io.known_runs import RUNS, KnownRun, RunRecords, is_record
 from mocoflow_core.io.manifest import MANIFEST, NO_MANIFEST, OTHER_MANIFEST, Manifest, Payload
 from mocoflow_core.io.remote_files import OpenUpload, RemoteFile, RemoteFiles
 from mocoflow_core.io.remote_store import RemoteStore
@@ -28,6 +28,7 @@ class RemoteHoldings:
     def __init__(self, files: RemoteFiles) -> None:
         self.place = files.url
         self._files = files
+        self._records = RunRecords(files.url, files.read)
 
     def look(self) -> list[Held]:
         keys = _by_key(self._files.below())
@@ -53,14 +54,17 @@ class RemoteHoldings:
                 return f"{payload.path} has changed since it was written"
         return None
 
-    def remove(self, held: Held) -> bool:
+    def remove(self, held: Held, needed: Callable[[], bool]) -> bool:
         """The manifest goes first: an artifact that is seen stays whole."""
         files = _by_key(self._files.below(held.name)).get(held.name, {})
         manifest = self._manifest(held.name) if MANIFEST in files else None
         going = _unnamed(files, manifest) if held.leftover else files
         if any(file.changed_at > held.used_at for file in going.values()):
             return False
-        self._files.remove(f"{held.name}/{name}" for name in sorted(going, key=_manifest_first))
+        if not self._hidden_unless(needed, f"{held.name}/{MANIFEST}", MANIFEST in going):
+            return False
+        # The manifest sorts last: one that somebody has written meanwhile would be seen and broken.
+        self._files.remove(f"{held.name}/{name}" for name in sorted(going))
         if held.leftover:
             for upload in _uploads_by_key(self._files.open_uploads()).get(held.name, []):
                 if upload.begun_at <= held.used_at:
@@ -68,11 +72,25 @@ class RemoteHoldings:
         return True
 
     def runs(self) -> list[KnownRun]:
-        contents = (self._files.read(path) for path in sorted(self._files.below(RUNS)))
-        return [run for content in contents if (run := KnownRun.read(content))]
+        files = self._files.below(RUNS)
+        return self._records.of({path: file for path, file in files.items() if is_record(path)})
 
     def forget(self, run: KnownRun) -> None:
         self._files.remove([run.file])
+
+    def _hidden_unless(self, needed: Callable[[], bool], manifest: str, there: bool) -> bool:
+        """Remove a manifest, for good unless it is needed; what fails puts it back."""
+        content = self._files.read(manifest) if there else None
+        if content is None:
+            return not needed()
+        self._files.remove([manifest])
+        stays = True
+        try:
+            stays = needed()
+        finally:
+            if stays:
+                self._files.write(manifest, content)
+        return not stays
 
     def _manifest(self, name: str) -> Manifest | None:
         return Manifest.parse(self._files.read(f"{name}/{MANIFEST}"))
@@ -138,7 +156,3 @@ def _unnamed(files: Files, manifest: Manifest | None) -> dict[str, RemoteFile]:
 
 def _payloads(manifest: Manifest) -> dict[str, Payload]:
     return {payload.sha256: payload for payload in manifest.payloads}
-
-
-def _manifest_first(name: str) -> bool:
-    return name != MANIFEST

@@ -42,12 +42,13 @@ class Store:
         self.url = str(folder)
         self._uses: UseLog | None = None
 
-    def serve(self, folder: Path) -> None:
+    def serve(self, folder: Path, machine: str) -> None:
         """From now on note what the run in this folder uses: it is kept as long as the folder.
 
-        Raises ``InputError`` on a full disk.
+        ``machine`` tells the one that the folder is on from others. Raises ``InputError`` on a full
+        disk.
         """
-        run = KnownRun.here(folder)
+        run = KnownRun.here(folder, machine)
         self._uses = UseLog(run, KnownRun.read(self._read(run.file)), self.write_run)
 
     def served(self) -> None:
@@ -83,7 +84,6 @@ class Store:
         with full_disk_is_bad_input(f"The artifact store {self.root}"), self._locked(folder):
             found = self._find_locked(kind, key)
             if found is None:
-                self._note_use(kind.stage, key)  # A killed try is needed as well.
                 clear_folder(folder)
                 if not resumes:
                     self._forget_try(partial)
@@ -112,14 +112,18 @@ class Store:
         return file.read_bytes() if file.exists() else None
 
     def _look(self, kind: type[Kind], key: str) -> Kind | None:
-        """The finished artifact in the local folder; being looked at makes it young again."""
+        """The finished artifact in the local folder; being looked at makes it young again.
+
+        That it is used is written down first, whether it is there or not: a killed try is needed
+        as well, and who removes artifacts puts those back that somebody has asked for meanwhile.
+        """
+        self._note_use(kind.stage, key)
         folder = self._folder(kind.stage, key)
         with suppress(OSError):  # Absent, or a store that may only be read.
             os.utime(folder / MANIFEST)
         manifest = Manifest.read(folder)
         if manifest is None or fault_of(folder):
             return None
-        self._note_use(kind.stage, key)
         return reference_to(kind, manifest, cached=True)
 
     def _find_locked(self, kind: type[Kind], key: str) -> Kind | None:

@@ -20,6 +20,7 @@ from mocoflow_core.metrics.misalignment import MisalignmentRow, misalignment_row
 from mocoflow_core.metrics.misplaced_persons import misplaced_person_rows
 from mocoflow_core.metrics.person_judge import PersonScoreConfig, open_networks
 from mocoflow_core.metrics.score import EvaluationConfig
+from mocoflow_core.progress import Progress, part_of, untold
 
 
 def misplaced_view_rows(
@@ -28,20 +29,23 @@ def misplaced_view_rows(
     capture: CaptureConfig,
     evaluating: EvaluationConfig,
     person: PersonScoreConfig,
+    progress: Progress = untold,
 ) -> list[MisalignmentRow]:
     """Rows of the views that a run would be scored on: other cameras', or held-out frames.
 
     The networks look at the few views of the error curve.
     """
-    clip = extract_clip(scene, capture)
+    clip = extract_clip(scene, capture, progress=part_of(progress, 0.0, 0.2))
     frames = select_training_frames(scene, capture).all
-    views = scored_views(clip, extract_evaluation(scene, frames, capture), evaluating)
+    others = extract_evaluation(scene, frames, capture, progress=part_of(progress, 0.2, 0.4))
+    views = scored_views(clip, others, evaluating)
     side = side_of(views, evaluating)
     rows = misalignment_rows(name, _photographs(views), side, evaluating)
     networks = open_networks(person)
     if not isinstance(networks, str):
         few = _photographs(few_views(views, evaluating))
-        rows += misplaced_person_rows(name, few, side, evaluating, networks)
+        looking = part_of(progress, 0.4, 1.0)
+        rows += misplaced_person_rows(name, few, side, evaluating, networks, looking)
     return rows
 
 

@@ -23,6 +23,7 @@ from mocoflow_core.metrics.perceptual import LpipsAlex, lpips_protocol
 from mocoflow_core.metrics.person_judge import Networks
 from mocoflow_core.metrics.score import WHITE, EvaluationConfig, on_white
 from mocoflow_core.perception.person import Picture
+from mocoflow_core.progress import Progress, untold
 
 View = tuple[NDArray[np.uint8], Mask]
 
@@ -33,6 +34,7 @@ def misplaced_person_rows(
     side: int,
     configuration: EvaluationConfig,
     networks: Networks,
+    progress: Progress = untold,
 ) -> list[MisalignmentRow]:
     """``lpips_alex``, ``plausibility`` and ``oks`` of views against themselves, misplaced.
 
@@ -54,7 +56,9 @@ def misplaced_person_rows(
     }
     scale = side / configuration.crop_reference_px
     rows = []
-    for misplacement in MISPLACEMENTS:
+    for number, misplacement in enumerate(MISPLACEMENTS):
+        by = f"{misplacement.amount:g} {misplacement.unit}"
+        progress(number / len(MISPLACEMENTS), f"views {misplacement.kind} by {by}")
         found = [_scores(view, misplacement, scale, side, networks) for view in views]
         for metric, reading in readings.items():
             counted = [scores[metric] for scores in found if scores[metric]]

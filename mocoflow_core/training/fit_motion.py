@@ -23,6 +23,10 @@ from mocoflow_core.fields.body_lattices import build_body_motion
 from mocoflow_core.fields.canonical_density import CanonicalDensity
 from mocoflow_core.fields.motion_body import BodyMotion
 from mocoflow_core.fields.scene_shape import MotionConfig
+from mocoflow_core.progress import Progress, part_of, untold
+
+# About the share of the time that goes into the look-up tables; the rest measures them.
+BUILDING = 0.8
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,7 @@ def fit_motion(
     shell_width_m: float,
     moves: bool,
     configuration: MotionConfig,
+    progress: Progress = untold,
 ) -> MotionStart:
     """Measure the mesh's motion and build both directions of the motion field from it.
 
@@ -87,16 +92,21 @@ def fit_motion(
     training = np.flatnonzero(~clip.held_out)
     different = training if moves else training[:1]
     body = build_body_motion(
-        controls.frames(different), density.prior(), shell_width_m, body_configuration
+        *(controls.frames(different), density.prior(), shell_width_m, body_configuration),
+        progress=part_of(progress, 0.0, BUILDING),
     )
-    fit = measure_fit(body, density.vertices, meshes.vertices[different])
+    measuring = part_of(progress, BUILDING, 1.0)
+    fit = measure_fit(body, density.vertices, meshes.vertices[different], measuring)
     if not moves:
         body = body.at_times(torch.from_numpy(clip.times[training]))
     return MotionStart(controls, body, fit)
 
 
 def measure_fit(
-    body: BodyMotion, canonical: NDArray[np.float32], observed: NDArray[np.float32]
+    body: BodyMotion,
+    canonical: NDArray[np.float32],
+    observed: NDArray[np.float32],
+    progress: Progress = untold,
 ) -> MotionFit:
     """Mean distances between moved mesh vertices and where the mesh has them."""
     errors = []
@@ -108,6 +118,7 @@ def measure_fit(
         placed, _ = body.to_observed(goal, frame)
         back, _ = body.to_observed(mapped, frame)
         errors.append([_mean_mm(mapped, goal), _mean_mm(placed, points), _mean_mm(back, points)])
+        progress((row + 1) / len(observed), f"fit of frame {row + 1}")
     return MotionFit(*np.mean(errors, axis=0).tolist())
 
 

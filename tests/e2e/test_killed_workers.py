@@ -68,7 +68,7 @@ def test_a_worker_killed_in_a_stage_loses_this_stage_alone(parts, scene, root, s
             break
         for item in FolderHoldings(store).look():  # The stage was faster than the signal.
             if item.name.startswith(f"{stage}/"):
-                FolderHoldings(store).remove(item)
+                FolderHoldings(store).remove(item, lambda: False)
     assert whole(store) == before
     assert unfinished(store) == [stage]
 

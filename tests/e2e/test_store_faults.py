@@ -18,6 +18,8 @@ from tests.object_storage import object_storage
 
 pytestmark = pytest.mark.faults
 
+DAY_S = 86400.0
+
 
 def computed(run):
     return [stage.name for stage in read_run(run).stages if not stage.cached]
@@ -100,29 +102,39 @@ def test_a_disk_that_fills_up_ends_the_run_and_more_space_lets_it_go_on(scene, t
         assert sorted(computed(tmp_path / "run") + kept) == sorted(STAGES)
 
 
-def test_a_scene_that_fails_stops_no_other_and_is_named_with_its_reason(scene, tmp_path):
-    scenes = []
+def cut_short(frame):
+    frame.write_bytes(frame.read_bytes()[:100])
+
+
+def dangling(frame):
+    """What the system says of it is no bad input's line."""
+    frame.unlink()
+    frame.symlink_to("nowhere")
+
+
+def test_scenes_that_fail_stop_no_other_and_are_named_with_their_reasons(scene, tmp_path):
+    scenes, broken = [], {1: dangling, 3: cut_short}
     for number in range(5):
         folder = shutil.copytree(scene, tmp_path / f"scene{number}")
         description = json.loads((folder / "scene.json").read_text())
         (folder / "scene.json").write_text(json.dumps(description | {"name": f"scene{number}"}))
         scenes.append(folder)
-    cut = scenes[2] / "frames" / "cam00" / "000003.png"
-    cut.write_bytes(cut.read_bytes()[:100])
+    for number, damage in broken.items():
+        damage(scenes[number] / "frames" / "cam00" / "000003.png")
     said = done(
         *("benchmark", "--scenes", *scenes, "--methods", "mocoflow", "--presets", "toy"),
         *("--seeds", "1", "--out", tmp_path / "out", "--store", tmp_path / "store", *QUICK),
     )
     record = json.loads((tmp_path / "out" / "benchmark.json").read_text())
     states = {cell["scene"]: cell["state"] for cell in record["cells"]}
-    assert states == {f"scene{n}": "failed" if n == 2 else "finished" for n in range(5)}
-    [reason] = [cell["reason"] for cell in record["cells"] if cell["state"] == "failed"]
-    assert "000003.png" in reason
-    assert f"scene2/toy/mocoflow/0 failed: {reason}" in said
-    for page in ("benchmark.html", "table.md"):
-        shown = (tmp_path / "out" / page).read_text()
-        assert "scene2" in shown, page
-        assert "000003.png" in shown, page
+    assert states == {f"scene{n}": "failed" if n in broken else "finished" for n in range(5)}
+    pages = [(tmp_path / "out" / name).read_text() for name in ("benchmark.html", "table.md")]
+    for number in broken:
+        reason = record["cells"][number]["reason"]
+        assert "000003.png" in reason
+        assert f"scene{number}/toy/mocoflow/0 failed: {reason}" in said
+        assert all(f"scene{number}" in page for page in pages)
+        assert all(page.count("000003.png") >= len(broken) for page in pages)
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +197,13 @@ def test_an_upload_of_many_parts_that_is_killed_is_never_seen_and_cleaned_up(sto
     access = storage.environment | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
     said = done("store", "verify", *url, environment=access)
     assert "left by an upload that was cut off" in said
-    done("store", "gc", *url, "--delete", environment=access)
+    collect = ("store", "gc", *url, "--delete")
+    for seconds_ago, options in ((600.0, ("--older-than", 0)), (6 * DAY_S, ())):
+        with storage.uploads_begun(seconds_ago):
+            done(*collect, *options, environment=access)
+        assert files.list_multipart_uploads("multipart")
+    with storage.uploads_begun(8 * DAY_S):
+        done(*collect, environment=access)
     assert files.list_multipart_uploads("multipart") == []
     subprocess.run(words, env=environment, check=True)  # The same machine uploads what it has.
     assert "Nothing is damaged." in done("store", "verify", *url, environment=access)

@@ -6,6 +6,9 @@ import pytest
 import trimesh
 
 from mocoflow_core.errors import InputError
+from mocoflow_core.estimators.context import EstimateContext
+from mocoflow_core.estimators.read import read_estimate
+from tests.estimators.layouts import CAMERA
 
 
 @pytest.fixture
@@ -32,6 +35,13 @@ def test_where_they_stand_can_be_said(folder, read, coordinates):
     estimate = read(folder, coordinates=coordinates)
     assert estimate.coordinates == coordinates
     assert estimate.located is (coordinates != "camera-root-centred")
+
+
+def test_each_file_is_told(folder):
+    said = []
+    read_estimate(folder, EstimateContext(CAMERA, progress=lambda *told: said.append(told)))
+    assert [share for share, _ in said] == [1 / 4, 2 / 4, 3 / 4]
+    assert {text for _, text in said} < {f"frame_{number}.obj" for number in range(8, 12)}
 
 
 def test_another_topology_is_refused_by_file(folder, read):

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.objects import StateType
+from prefect.exceptions import Abort
 from prefect.states import Cancelling
 from pyarrow import parquet
 
@@ -20,6 +21,8 @@ from flows import regression_event
 from flows.benchmark import NothingFinished
 from flows.benchmark_request import BenchmarkRequest
 from flows.command_line import main
+from flows.run_cells import run_cells
+from flows.workers import Workers
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.manifest import MANIFEST
 from mocoflow_core.metrics.curve import read_curve
@@ -134,6 +137,53 @@ def test_elsewhere_its_cells_come_from_the_store(first, compare, toy_scene, tmp_
     assert cell.from_store
     alone = [row for row in read_scores(out / "scores.parquet") if row.method == "mocoflow"]
     assert read_scores(tmp_path / "again/scores.parquet") == [r for r in alone if r.seed == 0]
+
+
+def test_a_frame_that_cannot_be_read_fails_its_cell_alone(compare, toy_scene, tmp_path):
+    """The error is the system's and no bad input's."""
+    scene = tmp_path / "dangling"
+    shutil.copytree(toy_scene, scene)
+    frame = scene / "frames" / "cam00" / "000003.png"
+    frame.unlink()
+    frame.symlink_to("nowhere")
+    asked = {"scenes": (str(scene), str(toy_scene)), "methods": METHODS[:1], "seeds": 1}
+    record = compare(tmp_path / "out", **asked)
+    assert [cell.state for cell in record.cells] == ["failed", "finished"]
+    assert "000003.png" in record.cells[0].reason
+    assert "000003.png" in (tmp_path / "out" / "table.md").read_text()
+    with get_client(sync_client=True) as client:
+        runs = {run.name: run.state for run in client.read_flow_runs()}
+    assert runs["dangling/toy/mocoflow/0"].is_failed()
+
+
+def test_whatever_goes_wrong_outside_of_a_cells_run_is_its_failure(tmp_path, monkeypatch):
+    scenes = [tmp_path / name for name in ("one", "two")]
+    for scene in scenes:
+        scene.mkdir()
+    request = BenchmarkRequest(scenes=tuple(map(str, scenes)), out=tmp_path / "out", seeds=1)
+
+    def run(cell, slots):
+        if cell.record.scene == "one":
+            raise PermissionError("not yours")
+        return cell.record.model_copy(update={"state": "finished"})
+
+    monkeypatch.setattr("flows.run_cells.run_cell", run)
+    first, second = run_cells(request.cells(), Workers())
+    assert (first.state, first.reason) == ("failed", "PermissionError: not yours")
+    assert second.state == "finished"
+
+
+@pytest.mark.parametrize("end", [KeyboardInterrupt, SystemExit, Abort])
+def test_who_ends_the_benchmark_ends_it_in_a_cell_too(end, tmp_path, monkeypatch):
+    (tmp_path / "one").mkdir()
+    request = BenchmarkRequest(scenes=(str(tmp_path / "one"),), out=tmp_path / "out", seeds=1)
+
+    def run(cell, slots):
+        raise end()
+
+    monkeypatch.setattr("flows.run_cells.run_cell", run)
+    with pytest.raises(end):
+        run_cells(request.cells(), Workers())
 
 
 def cancel_when_running(name: str) -> None:

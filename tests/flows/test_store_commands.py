@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import pytest
 from typer.testing import CliRunner
 
 from flows.command_line import app
+from flows.user_folders import this_machine
 from mocoflow_core.artifacts import ClipArtifact, PlanArtifact
+from mocoflow_core.errors import InputError
+from mocoflow_core.io.holdings import FolderHoldings
+from mocoflow_core.io.known_runs import KnownRun
 from mocoflow_core.io.run_folder import RunFolder, RunRecord, StageRecord
 from mocoflow_core.io.store import Store
 
@@ -36,7 +41,7 @@ def store(tmp_path):
         request="a", scene="s", scene_path="", preset="toy", seed=0, configuration={}, store=""
     )
     RunFolder.claim(tmp_path / "run", begun)
-    made.serve(tmp_path / "run")
+    made.serve(tmp_path / "run", this_machine())
     compute(made, ClipArtifact, CLIP)
     return made
 
@@ -78,6 +83,70 @@ def test_gc_removes_with_delete_what_no_run_needs(store):
     assert "freed" in said("gc", "--store", store.url, "--older-than", 0, "--delete")
     assert not (store.root / PLAN).exists()
     assert store.find(ClipArtifact, CLIP.partition("/")[2])
+
+
+def used(store, folder, *names):
+    """Written down by a run of this machine whose folder is there."""
+    folder.mkdir(exist_ok=True)
+    (folder / "run.json").write_text("{}")
+    store.write_run(KnownRun.here(folder, this_machine()).using(names))
+
+
+def test_gc_keeps_what_a_run_made_while_it_began(store, tmp_path, monkeypatch):
+    """Its record is younger than the first look at the records."""
+    look = FolderHoldings.look
+
+    def begun_meanwhile(place):
+        used(store, tmp_path / "late", PLAN)
+        return look(place)
+
+    monkeypatch.setattr(FolderHoldings, "look", begun_meanwhile)
+    assert "0 B freed." in said("gc", "--store", store.url, "--older-than", 0, "--delete")
+    assert (store.root / PLAN).is_dir()
+
+
+def test_gc_keeps_what_a_run_took_between_the_verdict_and_the_removal(store, tmp_path, monkeypatch):
+    remove = FolderHoldings.remove
+
+    def taken_meanwhile(place, *held):
+        used(store, tmp_path / "late", PLAN)
+        return remove(place, *held)
+
+    monkeypatch.setattr(FolderHoldings, "remove", taken_meanwhile)
+    output = said("gc", "--store", store.url, "--older-than", 0, "--delete")
+    assert f"goes  {PLAN}" in output
+    assert "0 B freed." in output
+    assert store.find(PlanArtifact, PLAN.partition("/")[2])
+
+
+@pytest.mark.parametrize("command", ["gc", "ls"])
+def test_a_record_of_a_newer_version_ends_the_command_and_nothing_is_removed(store, command):
+    record = next((store.root / "runs").iterdir())
+    record.write_text(json.dumps({**json.loads(record.read_text()), "added_later": 1}))
+    words = ["--older-than", "0", "--delete"] if command == "gc" else []
+    result = CliRunner().invoke(app, ["store", command, "--store", store.url, *words])
+    assert (store.root / CLIP).is_dir()
+    assert (store.root / PLAN).is_dir()
+    assert isinstance(result.exception, InputError)
+    assert str(record) in str(result.exception)
+    assert "remove the file" in result.exception.action
+
+
+def test_of_two_machines_of_one_name_neither_removes_what_the_other_needs(
+    store, tmp_path, monkeypatch
+):
+    shutil.rmtree(tmp_path / "run")  # As the other machine sees it.
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "another"))
+    said("gc", "--store", store.url, "--older-than", 0, "--delete")
+    assert (store.root / CLIP).is_dir()
+
+
+def test_a_machine_that_got_another_name_knows_its_runs(store, tmp_path, monkeypatch):
+    """As a container does that is made anew."""
+    shutil.rmtree(tmp_path / "run")
+    monkeypatch.setattr("socket.gethostname", lambda: "renamed")
+    said("gc", "--store", store.url, "--older-than", 0, "--delete")
+    assert not (store.root / CLIP).exists()
 
 
 def test_gc_keeps_what_is_young(store):

@@ -47,6 +47,16 @@ def test_meshes_are_joined_by_frame_number_not_by_row(prepared):
     assert np.array_equal(again.controls.observed, prepared.motion.controls.observed)
 
 
+def test_every_frame_is_told_and_nothing_changes_by_it(prepared):
+    said = []
+    given = (prepared.clip, prepared.meshes, prepared.density, SHELL_M, True, MOTION)
+    told = fit_motion(*given, lambda fraction, text: said.append(fraction))
+    assert said == sorted(said)
+    assert len(said) == 2 * (~prepared.clip.held_out).sum()
+    assert said[-1] == pytest.approx(1.0)
+    assert told.fit == prepared.motion.fit
+
+
 def test_the_canonical_density_is_that_of_the_asked_frame(prepared):
     meshes = prepared.meshes
     frame = int(meshes.frame_indices[3])
