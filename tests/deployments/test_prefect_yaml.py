@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import yaml
@@ -10,6 +12,7 @@ from prefect.events.schemas.automations import AutomationCore
 from prefect.exceptions import ParameterTypeError
 from prefect.flows import load_flow_from_entrypoint
 from prefect.schedules import Cron
+from prefect.workers.process import ProcessJobConfiguration
 
 from flows.data_set_roots import ROOTS
 
@@ -84,6 +87,17 @@ def test_a_data_set_is_paused_and_says_what_it_waits_for(name):
 def test_a_parameter_out_of_its_bounds_is_no_valid_one(entrypoint, parameters):
     with pytest.raises(ParameterTypeError):
         load_flow_from_entrypoint(entrypoint).validate_parameters(parameters)
+
+
+@pytest.mark.parametrize("env", [{"env": {"MOCOFLOW_DATA_ROOTS": ""}}, {"env.A": "b"}], ids=str)
+def test_who_starts_a_run_chooses_neither_its_environment_nor_its_command(env):
+    asked = env | {"command": "id", "working_dir": "/etc"}
+    made = asyncio.run(
+        ProcessJobConfiguration.from_template_and_values(
+            POOL["base_job_template"], asked, client=Mock()
+        )
+    )
+    assert (made.env, made.command, made.working_dir) == ({}, None, None)
 
 
 def test_the_automation_can_be_read_and_outlasts_some_heartbeats():
