@@ -3,9 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 
-# make up DB=postgresql PORT=4201 STATE=/srv/mocoflow
-DB ?= sqlite
-PORT ?= 4200
+# make up DB=postgresql PORT=4201 STATE=/srv/mocoflow; a site keeps its database and port.
 SITE = $(BIN)/python -m flows.production
 STATE_FOLDER = $(if $(STATE),--state $(STATE))
 
@@ -23,7 +21,7 @@ demo: install
 
 # A Prefect server with its database, all deployments and a worker, until `make down`.
 up: install
-	$(SITE) up --database $(DB) --port $(PORT) $(STATE_FOLDER)
+	$(SITE) up $(if $(DB),--database $(DB)) $(if $(PORT),--port $(PORT)) $(STATE_FOLDER)
 
 down: install
 	$(SITE) down $(STATE_FOLDER)

@@ -19,11 +19,14 @@ State = Annotated[Path, typer.Option(help="Folder of its state.", default_factor
 @app.command()
 def up(
     state: State,
-    database: Annotated[Database, typer.Option(help="Of the server.")] = Database.SQLITE,
-    port: Annotated[int, typer.Option(help="Of the server.", min=1, max=65535)] = 4200,
+    database: Annotated[Database | None, typer.Option(help="Of a new site.")] = None,
+    port: Annotated[int | None, typer.Option(help="Of the server.", min=1, max=65535)] = None,
 ) -> None:
-    """Start database, server and worker on this machine, with all deployments; again is fine."""
-    for line in bring_up(Site(state.resolve(), port, database)):
+    """Start database, server and worker on this machine, with all deployments; again is fine.
+
+    A site keeps its database and port; a new one has sqlite and 4200 unless told otherwise.
+    """
+    for line in bring_up(Site.asked_for(state.resolve(), port, database)):
         typer.echo(line)
 
 
@@ -31,8 +34,12 @@ def up(
 def down(state: State) -> None:
     """Cancel the runs and end all processes of this machine's site."""
     site = Site.of_folder(state.resolve())
-    lines = list(take_down(site)) if site else []
-    typer.echo("\n".join(lines) or f"Nothing of {state} is running.")
+    was_running = False
+    for line in take_down(site) if site else ():
+        was_running = True
+        typer.echo(line)
+    if not was_running:
+        typer.echo(f"Nothing of {state} is running.")
 
 
 @app.command()

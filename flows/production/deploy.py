@@ -11,7 +11,6 @@ import yaml
 from prefect.client.orchestration import SyncPrefectClient, get_client
 from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
 from prefect.exceptions import ObjectNotFound
-from prefect.workers.process import ProcessWorker
 
 from flows.data_set_roots import ROOTS, configured_roots
 from flows.production.automations import make_automation, make_notifications
@@ -25,7 +24,7 @@ FOLDER = Path("deployments")
 def deploy() -> list[str]:
     """Make or change what the files say, and give a line on each schedule, and on who is told.
 
-    The schedule of a data set runs where its root is configured, and is paused where it is not.
+    The schedule of a data set runs where its root is a folder, and is paused where it is not.
 
     Raises InputError outside of the repository's root.
     """
@@ -58,7 +57,7 @@ def _read(name: str) -> dict[str, Any]:
 
 
 def _make_pool(client: SyncPrefectClient, pool: Mapping[str, Any]) -> None:
-    template = ProcessWorker.get_default_base_job_template()
+    template = pool["base_job_template"]
     try:
         client.read_work_pool(pool["name"])
     except ObjectNotFound:
@@ -88,13 +87,22 @@ def _deploy_flows() -> None:
 def _set_schedules(client: SyncPrefectClient, asked: Mapping[str, Any]) -> Iterator[str]:
     """Pause or resume the schedules of a data set's deployment; say how each one is."""
     name = asked["name"]
+    missing = _missing_root(name) if name in ROOTS else None
     [deployment] = [found for found in client.read_deployments() if found.name == name]
     for schedule in deployment.schedules if name in ROOTS else ():
-        client.update_deployment_schedule(
-            deployment.id, schedule.id, active=name in configured_roots()
-        )
+        client.update_deployment_schedule(deployment.id, schedule.id, active=not missing)
     title = f"{client.read_flow(deployment.flow_id).name}/{name}"
     for schedule in asked["schedules"]:
-        active = name in configured_roots() if name in ROOTS else schedule["active"]
-        state = "runs" if active else f"paused: set {ROOTS[name]} and deploy again"
+        runs = schedule["active"] or name in ROOTS
+        state = f"paused: {missing}" if missing else "runs" if runs else "paused"
         yield f"{title:<26} {schedule['cron']} {schedule['timezone']:<9} {state}"
+
+
+def _missing_root(data_set: str) -> str | None:
+    """What has to be done before the schedule of a data set can run, if anything."""
+    root = configured_roots().get(data_set)
+    if root is None:
+        return f"set {ROOTS[data_set]} and deploy again"
+    if not root.is_dir():
+        return f"{ROOTS[data_set]} is no folder, {root}: mend it and deploy again"
+    return None

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flows.production.site import Site
+from flows.production.site import MARK, Site
 from mocoflow_core.errors import InputError
 
 ROLE = "prefect"
+# What the database is told of the environment of who starts it, who may be another user.
+TOLD = ("PATH", "LD_LIBRARY_PATH", "TZ")
 # Where packages put the programs that are not in PATH.
 PLACES = (
     "/usr/lib/postgresql/*/bin",
@@ -77,7 +79,8 @@ class PostgreSQL:
         if not (self.data / "postmaster.pid").is_file():
             return False
         status = [str(find_programs(self._version()) / "pg_ctl"), "-D", str(self.data), "status"]
-        return subprocess.run(status, capture_output=True, **_user()).returncode == 0
+        done = subprocess.run(status, capture_output=True, env=_environment(), **_user())
+        return done.returncode == 0
 
     def stop(self) -> bool:
         """Stop it; tell whether it was running."""
@@ -100,7 +103,7 @@ class PostgreSQL:
         """Make a folder of the database's user, who must be able to reach it."""
         folder.mkdir(mode=0o700, exist_ok=True)
         self._give_away(folder)
-        if subprocess.run(["test", "-w", folder], **_user()).returncode != 0:
+        if subprocess.run(["test", "-w", folder], env=_environment(), **_user()).returncode != 0:
             raise InputError(
                 f"PostgreSQL's folder must be reachable for the user {_user()['user']}, as which "
                 "it runs in place of root",
@@ -118,7 +121,7 @@ class PostgreSQL:
             done = subprocess.run(
                 [program, *words],
                 cwd="/",
-                env=self.site.environment() | {"LC_ALL": "C"},
+                env=_environment() | {MARK: str(self.site.folder)},
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
@@ -181,6 +184,11 @@ def _user() -> dict[str, Any]:
             continue
         return {"user": name, "group": entry.pw_gid, "extra_groups": []}
     raise InputError("a user postgres or nobody, as PostgreSQL does not run as root", "none", "")
+
+
+def _environment() -> dict[str, str]:
+    """None of the passwords around it: the user that runs the database can read it."""
+    return {name: os.environ[name] for name in TOLD if name in os.environ} | {"LC_ALL": "C"}
 
 
 def _free_port() -> int:

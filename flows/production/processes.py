@@ -84,9 +84,14 @@ def _pid_of(site: Site, name: str) -> int | None:
 
 
 def _started_at(pid: int) -> str:
-    """When a process was started, as ps writes it; nothing for one that is gone."""
+    """When a process was started, as ps writes it; nothing for one that is gone.
+
+    In UTC and English, whatever the user's terminal says.
+    """
     words = ["ps", "-o", "stat=,lstart=", "-p", str(pid)]
-    state, _, when = subprocess.run(words, capture_output=True, text=True).stdout.partition(" ")
+    everywhere = os.environ | {"TZ": "UTC", "LC_ALL": "C"}
+    said = subprocess.run(words, capture_output=True, text=True, env=everywhere).stdout
+    state, _, when = said.partition(" ")
     return "" if state.startswith("Z") else " ".join(when.split())
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
-from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT
+from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT, STORE
+from flows.data_set_roots import ROOTS
 from flows.user_folders import data_folder, results_folder
+from mocoflow_core.errors import InputError
 
 
 class Database(StrEnum):
@@ -24,6 +26,8 @@ class Database(StrEnum):
 MARK = "MOCOFLOW_SITE"
 PREFECT = (sys.executable, "-m", "prefect")
 AUTHENTICATION = "PREFECT_SERVER_API_AUTH_STRING"
+# What a worker's runs are told about folders and stores.
+WORKER_VARIABLES = (DATA_ROOTS, RESULTS_ROOT, STORE, *ROOTS.values())
 
 
 def default_folder() -> Path:
@@ -64,6 +68,7 @@ class Site:
         """Of the site's processes: the user's own, with the site's settings.
 
         Runs are confined to folders: the user's, or else those that mocoflow has among their data.
+        An empty variable counts as none, and a relative path lies below the working directory.
         """
         chosen = {
             MARK: str(self.folder),
@@ -77,12 +82,15 @@ class Site:
             "PREFECT_FLOWS_HEARTBEAT_FREQUENCY": "30",
             "NO_COLOR": "1",
         }
-        if AUTHENTICATION in os.environ:
-            chosen["PREFECT_API_AUTH_STRING"] = os.environ[AUTHENTICATION]
+        if secret := os.environ.get(AUTHENTICATION):
+            chosen |= {AUTHENTICATION: secret, "PREFECT_API_AUTH_STRING": secret}
         if database_url:
             chosen["PREFECT_SERVER_DATABASE_CONNECTION_URL"] = database_url
         roots = {DATA_ROOTS: str(data_folder()), RESULTS_ROOT: str(results_folder())}
-        return roots | os.environ | chosen
+        told = {name: value for name in WORKER_VARIABLES if (value := _told(name))}
+        chosen |= roots | told
+        ours = (AUTHENTICATION, *WORKER_VARIABLES)
+        return {name: v for name, v in os.environ.items() if name not in ours} | chosen
 
     def save(self) -> None:
         document = {"port": self.port, "database": self.database}
@@ -96,3 +104,30 @@ class Site:
         except OSError:
             return None
         return cls(folder, document["port"], Database(document["database"]))
+
+    @classmethod
+    def asked_for(
+        cls, folder: Path, port: int | None = None, database: Database | None = None
+    ) -> Site:
+        """The site of a folder, where nothing else is asked for; a new one has the defaults.
+
+        Raises InputError for another database than the one that has kept the site's runs.
+        """
+        before = cls.of_folder(folder)
+        if before and database and database != before.database:
+            raise InputError(
+                f"{before.database}, in which the site in {folder} keeps its runs",
+                str(database),
+                "Leave DB out, or begin another site: make up STATE=DIR.",
+            )
+        site = before or cls(folder)
+        return replace(site, port=port or site.port, database=database or site.database)
+
+
+def _told(name: str) -> str:
+    """A worker's variable, whose working directory is another; empty where it is not set."""
+    value = os.environ.get(name, "")
+    if name == STORE and ("://" in value or "::" in value):
+        return value
+    paths = value.split(os.pathsep) if name == DATA_ROOTS else [value]
+    return os.pathsep.join(str(Path(path).absolute()) for path in paths if path)

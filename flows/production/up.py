@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from http import HTTPStatus
 from typing import Any
+from urllib.error import HTTPError
 
-from flows.production.api import answers, ask, wait_for
+from flows.production.api import admits, answers, ask, wait_for
 from flows.production.postgresql import PostgreSQL
 from flows.production.processes import end_what_is_left, is_running, start, stop
-from flows.production.site import PREFECT, Database, Site
+from flows.production.site import AUTHENTICATION, PREFECT, WORKER_VARIABLES, Database, Site
 from mocoflow_core.errors import InputError
 
 POOL = "mocoflow"
@@ -26,28 +29,29 @@ UNDER_WAY = ("RUNNING", "PENDING", "CANCELLING")
 def bring_up(site: Site) -> Iterator[str]:
     """Start what is not running yet, deploy, and say what was done.
 
-    Raises InputError for a port that is taken, and for another database or other folders than
-    what is running has.
+    Raises InputError for a port that is taken, and for another database, password or other folders
+    than what is running has.
     """
     _require_the_same(site)
     _require_the_same_worker(site)
     site.folder.mkdir(parents=True, exist_ok=True)
     site.logs.mkdir(exist_ok=True)
+    url = PostgreSQL(site).start() if site.database == Database.POSTGRESQL else None
     site.save()
-    url = None
-    if site.database == Database.POSTGRESQL:
-        url = PostgreSQL(site).start()
+    if url:
         yield "PostgreSQL   runs"
     if not is_running(site, "server"):
         _start_server(site, url)
     _require(wait_for(lambda: answers(site.api), STARTS_WITHIN_S), site, "server")
+    _require_the_same_password(site)
     yield f"server       {site.api}"
     words = [sys.executable, "-m", "flows.production", "deploy"]
     subprocess.run(words, env=site.environment(), check=True)
+    _pause(site, False)
     if not is_running(site, "worker"):
         words = ["worker", "start", "--pool", POOL, "--name", _worker()]
         limit = ["--limit", str(RUNS_AT_ONCE)]
-        (site.folder / WORKER_SETTINGS).write_text(json.dumps(_settings(site)) + "\n")
+        _write_settings(site)
         start(site, "worker", [*PREFECT, *words, *limit], site.environment())
     _require(wait_for(lambda: _is_online(site), STARTS_WITHIN_S), site, "worker")
     roots = site.environment()
@@ -59,9 +63,15 @@ def bring_up(site: Site) -> Iterator[str]:
 
 
 def take_down(site: Site, grace_s: float = 60.0) -> Iterator[str]:
-    """Cancel what runs, end all processes, and say what was done."""
-    if is_running(site, "worker") and answers(site.api):
-        yield from _cancel_runs(site, grace_s)
+    """Cancel what runs, end all processes, and say what was done.
+
+    What waits in a queue stays there: the pool is paused until the site is brought up again.
+    """
+    if is_running(site, "worker"):
+        try:
+            yield from _cancel_runs(site, grace_s)
+        except OSError as error:
+            yield f"runs are ended without being cancelled: {error}{_hint(error)}"
     for name in ("worker", "server"):
         if stop(site, name):
             yield f"{name} stopped"
@@ -83,13 +93,34 @@ def _start_server(site: Site, url: str | None) -> None:
 
 def _cancel_runs(site: Site, grace_s: float) -> Iterator[str]:
     """As the button on a run's page; their finished stages stay in the store."""
-    under_way = _runs(site)
-    for run in under_way:
-        wanted = {"state": {"type": "CANCELLING", "name": "Cancelling"}}
-        ask(site.api, f"/flow_runs/{run['id']}/set_state", wanted)
-    if under_way:
-        wait_for(lambda: not _runs(site), grace_s)
-        yield f"{len(under_way)} runs cancelled: {', '.join(run['name'] for run in under_way)}"
+    _pause(site, True)
+    asked: dict[str, str] = {}
+
+    def are_gone() -> bool:
+        # Again and again, as the worker may have taken one just before the pause.
+        under_way = _runs(site)
+        for run in under_way:
+            if run["id"] not in asked:
+                wanted = {"state": {"type": "CANCELLING", "name": "Cancelling"}}
+                ask(site.api, f"/flow_runs/{run['id']}/set_state", wanted)
+                asked[run["id"]] = run["name"]
+        return not under_way
+
+    in_time = wait_for(are_gone, grace_s)
+    if asked:
+        yield f"{len(asked)} runs cancelled: {', '.join(asked.values())}"
+    if not in_time:
+        yield f"some did not end within {grace_s:g} s and are killed"
+
+
+def _hint(error: OSError) -> str:
+    refused = isinstance(error, HTTPError) and error.code == HTTPStatus.UNAUTHORIZED
+    return f"; set {AUTHENTICATION} as it was for make up" if refused else ""
+
+
+def _pause(site: Site, paused: bool) -> None:
+    """Let the worker take no more runs, or take them again."""
+    ask(site.api, f"/work_pools/{POOL}", {"is_paused": paused}, "PATCH")
 
 
 def _runs(site: Site) -> list[dict[str, Any]]:
@@ -128,7 +159,7 @@ def _require_the_same_worker(site: Site) -> None:
     if not is_running(site, "worker"):
         return
     before, now = json.loads((site.folder / WORKER_SETTINGS).read_text()), _settings(site)
-    differ = sorted(name for name in before | now if before.get(name) != now.get(name))
+    differ = [name for name in WORKER_VARIABLES if before.get(name) != now.get(name)]
     if differ:
         raise InputError(
             "the settings that the running worker was started with",
@@ -137,6 +168,24 @@ def _require_the_same_worker(site: Site) -> None:
         )
 
 
+def _require_the_same_password(site: Site) -> None:
+    secret = os.environ.get(AUTHENTICATION)
+    is_open = admits(site.api, None)
+    if is_open != (not secret) or not admits(site.api, secret):
+        raise InputError(
+            f"the {'empty ' if is_open else ''}{AUTHENTICATION} that the running server has",
+            "another one" if secret else "none",
+            "Set the same, or take it down first: make down.",
+        )
+
+
 def _settings(site: Site) -> dict[str, str]:
-    """What runs are told about folders and stores."""
-    return {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")}
+    return {n: v for n, v in site.environment().items() if n in WORKER_VARIABLES}
+
+
+def _write_settings(site: Site) -> None:
+    """For their owner alone: a store's address may have a password in it."""
+    file = site.folder / WORKER_SETTINGS
+    file.touch()
+    file.chmod(0o600)
+    file.write_text(json.dumps(_settings(site)) + "\n")

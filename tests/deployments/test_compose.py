@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from flows.user_folders import body_models_folder
+
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docker-compose.yml").read_text()
 COMPOSE = yaml.safe_load(TEXT)
@@ -50,9 +52,10 @@ def test_a_password_comes_from_the_environment_and_has_no_default(name):
 
 @services
 def test_a_variable_is_required_or_has_a_harmless_default(name):
+    harmless = ("", "./data", "./body_models", "http://127.0.0.1:4200")
     used = re.findall(r"\$\{([A-Z_]+)(:[?-])([^}]*)\}", yaml.dump(SERVICES[name], width=10_000))
     for variable, kind, default in used:
-        assert kind == ":?" or default in ("", "./data"), variable
+        assert kind == ":?" or default in harmless, variable
 
 
 @long_lived
@@ -73,13 +76,30 @@ def test_a_service_waits_for_services_that_can_become_what_it_waits_for(name):
 
 
 @services
-def test_what_is_kept_lies_in_named_volumes_and_data_cannot_be_changed(name):
+def test_what_is_kept_lies_in_named_volumes_and_what_users_give_cannot_be_changed(name):
     for volume in SERVICES[name].get("volumes", []):
-        if volume.endswith(":/data:ro"):
+        if volume.endswith(":ro"):
+            assert volume.startswith("${MOCOFLOW_")
             continue
         source, _, target = volume.partition(":")
         assert source in COMPOSE["volumes"], volume
         assert target.startswith("/")
+
+
+@pytest.mark.parametrize("name", ["worker-cpu", "worker-gpu"])
+def test_body_models_are_mounted_where_runs_look_for_them(name, monkeypatch):
+    worker = SERVICES[name]
+    monkeypatch.setenv("XDG_DATA_HOME", worker["environment"]["XDG_DATA_HOME"])
+    assert f"{body_models_folder()}:ro" in [v.partition("}:")[2] for v in worker["volumes"]]
+
+
+def test_deployments_are_made_where_the_data_sets_can_be_seen():
+    assert SERVICES["deployments"]["volumes"][0] == SERVICES["worker-cpu"]["volumes"][0]
+
+
+def test_the_health_of_the_server_and_the_database_is_that_of_the_whole():
+    assert "/api/ready" in SERVICES["server"]["healthcheck"]["test"][-1]
+    assert "--host 127.0.0.1" in SERVICES["database"]["healthcheck"]["test"][-1]
 
 
 @pytest.mark.parametrize("name", [n for n, service in SERVICES.items() if is_ours(service)])

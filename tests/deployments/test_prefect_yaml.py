@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
+from unittest.mock import Mock
 from uuid import uuid4
 
 import pytest
@@ -12,6 +14,7 @@ from prefect.exceptions import ParameterTypeError
 from prefect.flows import load_flow_from_entrypoint
 from prefect.schedules import Cron
 from prefect.utilities.schema_tools.validation import validate
+from prefect.workers.process import ProcessJobConfiguration
 
 from flows.data_set_roots import ROOTS
 from flows.regression_event import EVENT
@@ -145,6 +148,17 @@ def refused_by_the_server(flow, parameters):
     """What the server finds wrong before it makes a run."""
     schema = flow.parameters.model_dump()
     return validate(parameters, schema, ignore_required=True, allow_none_with_default=True)
+
+
+@pytest.mark.parametrize("env", [{"env": {"MOCOFLOW_DATA_ROOTS": ""}}, {"env.A": "b"}], ids=str)
+def test_who_starts_a_run_chooses_neither_its_environment_nor_its_command(env):
+    asked = env | {"command": "id", "working_dir": "/etc"}
+    made = asyncio.run(
+        ProcessJobConfiguration.from_template_and_values(
+            POOL["base_job_template"], asked, client=Mock()
+        )
+    )
+    assert (made.env, made.command, made.working_dir) == ({}, None, None)
 
 
 def test_the_automation_can_be_read_and_outlasts_some_heartbeats():

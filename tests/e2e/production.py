@@ -15,7 +15,6 @@ from pathlib import Path
 
 from flows.production.api import ask, wait_for
 from flows.production.postgresql import find_programs
-from flows.production.processes import end_what_is_left
 from flows.production.site import Database, Site
 from mocoflow_core.errors import InputError
 from tests.free_port import free_port
@@ -23,6 +22,7 @@ from tests.free_port import free_port
 ROOT = Path(__file__).parents[2]
 PREFECT = [sys.executable, "-m", "prefect"]
 POOL = "mocoflow"
+UNNEEDED = "MOCOFLOW_DATABASE_PASSWORD"
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Production:
 
 
 @contextmanager
-def production(root: Path, files: Path) -> Iterator[Production]:
+def production(root: Path, files: Path, database: Database) -> Iterator[Production]:
     """Everything that a deployed run needs, for as long as the block lasts.
 
     Args:
@@ -108,7 +108,7 @@ def production(root: Path, files: Path) -> Iterator[Production]:
     # PostgreSQL does not run as root, and others may not look into what the tests keep.
     state = Path(tempfile.mkdtemp(prefix="mocoflow-e2e-"))
     state.chmod(0o755)
-    site = Site(state, free_port(), database())
+    site = Site(state, free_port(), database)
     environment = site.environment() | {
         "MOCOFLOW_DATA_ROOTS": str(files),
         "MOCOFLOW_RESULTS_ROOT": str(files),
@@ -118,24 +118,29 @@ def production(root: Path, files: Path) -> Iterator[Production]:
         "PREFECT_WORKER_QUERY_SECONDS": "2",
         "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))),
         "XDG_CACHE_HOME": str(root / "cache"),
+        # One of compose's, which nobody here needs.
+        UNNEEDED: "a secret",
     }
     del environment["MOCOFLOW_SITE"]
     made = Production(site.api, environment, root, site)
     try:
-        print(site_command(made, site, "up"))
+        print(site_command(made, site, "up", *new(site)))
         yield made
     finally:
-        site_command(made, site, "down")
-        left = end_what_is_left(site)
+        said = site_command(made, site, "down")
         shutil.rmtree(state)
-    assert left == []
+    assert "left behind" not in said
 
 
-def site_command(made: Production, site: Site, command: str) -> str:
+def new(site: Site) -> list[str]:
+    """How ``up`` is told what a new site shall have."""
+    return ["--port", str(site.port), "--database", str(site.database)]
+
+
+def site_command(made: Production, site: Site, command: str, *options: str) -> str:
     """What a command of production's own prints."""
     words = [sys.executable, "-m", "flows.production", command, "--state", str(site.folder)]
-    if command == "up":
-        words += ["--port", str(site.port), "--database", str(site.database)]
+    words += options
     done = subprocess.run(
         words, cwd=ROOT, env=made.environment, capture_output=True, text=True, timeout=600.0
     )
@@ -144,11 +149,10 @@ def site_command(made: Production, site: Site, command: str) -> str:
     return done.stdout
 
 
-def database() -> Database:
+def available_database() -> Database:
     """PostgreSQL where its programs are, as in production; else a file."""
     try:
         find_programs()
-    except InputError as error:
-        print(f"with SQLite: {error}")
+    except InputError:
         return Database.SQLITE
     return Database.POSTGRESQL

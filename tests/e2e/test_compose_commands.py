@@ -5,6 +5,7 @@ Their words and environment are the file's own; only hosts, ports and folders ar
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -14,21 +15,24 @@ import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.error import HTTPError
+from urllib.request import urlopen
 
 import pytest
 import s3fs
 import yaml
 
-from flows.production.api import ask, wait_for
+from flows.production.api import admits, answers, ask, wait_for
 from flows.production.postgresql import PostgreSQL
 from flows.production.processes import heed_interrupts
 from flows.production.site import AUTHENTICATION, Database, Site
-from tests.e2e.production import ROOT, database
+from tests.e2e.production import ROOT, available_database
 from tests.free_port import free_port
 
 pytestmark = [
     pytest.mark.e2e,
-    pytest.mark.skipif(database() != Database.POSTGRESQL, reason="PostgreSQL is not installed"),
+    pytest.mark.skipif(
+        available_database() != Database.POSTGRESQL, reason="PostgreSQL is not installed"
+    ),
 ]
 SERVICES = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
 SECRET = "somebody:a secret, with / and @"
@@ -42,10 +46,11 @@ class Here:
         self.port, self.health, self.storage = free_port(), free_port(), free_port()
         self.api = f"http://127.0.0.1:{self.port}/api"
         self.folder = folder
-        self.secrets = {
+        self.given = {
             AUTHENTICATION: SECRET,
             "MOCOFLOW_DATABASE_PASSWORD": user.partition(":")[2],
             "MOCOFLOW_STORAGE_SECRET": "another secret",
+            "MOCOFLOW_PAGES": "https://pages.example.org",
         }
         address, _, name = place.partition("/")
         self.places = {
@@ -63,7 +68,8 @@ class Here:
         """The service's own, filled in as the container engine does, and nothing else of ours."""
 
         def filled(value: str) -> str:
-            return re.sub(r"\$\{([A-Z_]+):[?-][^}]*\}", lambda m: self.secrets.get(m[1], ""), value)
+            variable = r"\$\{([A-Z_]+):(?:-|\?[^}]*)([^}]*)\}"
+            return re.sub(variable, lambda m: self.given.get(m[1], m[2]), value)
 
         asked = {name: filled(value) for name, value in SERVICES[service]["environment"].items()}
         kept = ("PATH", "PYTHONPATH", "HOME")
@@ -146,6 +152,19 @@ def test_the_server_answers_nobody_without_the_password(server, monkeypatch):
     assert ask(server.api, "/flows/filter", {}) == []
 
 
+def test_whether_the_database_answers_is_told_without_the_password(server, monkeypatch):
+    monkeypatch.delenv(AUTHENTICATION, raising=False)
+    assert answers(server.api)
+    assert admits(server.api, SECRET)
+    assert not admits(server.api, None)
+    assert not admits(server.api, "somebody:a guess")
+
+
+def test_the_pages_ask_the_api_where_their_address_says(server):
+    with urlopen(server.api.removesuffix("/api") + "/ui-settings") as answer:
+        assert json.load(answer)["api_url"] == "https://pages.example.org/api"
+
+
 @pytest.fixture(scope="module")
 def storage(here):
     with running(here, "storage"):
@@ -163,7 +182,7 @@ def bucket(here, secret):
 def test_the_object_store_wants_its_password(storage):
     with pytest.raises(PermissionError):
         bucket(storage, "a guess").ls("")
-    assert bucket(storage, storage.secrets["MOCOFLOW_STORAGE_SECRET"]).ls("") == []
+    assert bucket(storage, storage.given["MOCOFLOW_STORAGE_SECRET"]).ls("") == []
 
 
 def test_deployments_are_made_and_workers_take_their_runs(server, storage, monkeypatch):
@@ -177,7 +196,7 @@ def test_deployments_are_made_and_workers_take_their_runs(server, storage, monke
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "set MOCOFLOW_AIST_ROOT and deploy again" in done.stdout
-    kept = bucket(storage, storage.secrets["MOCOFLOW_STORAGE_SECRET"])
+    kept = bucket(storage, storage.given["MOCOFLOW_STORAGE_SECRET"])
     assert kept.ls("") == ["mocoflow"]
     assert len(ask(server.api, "/deployments/filter", {})) == 7
     for name in ("cpu", "gpu"):

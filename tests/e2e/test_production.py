@@ -5,18 +5,25 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import time
+from datetime import UTC, datetime
+from pathlib import Path
 from urllib.error import HTTPError
+from uuid import uuid4
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
+from flows.production.api import ask
 from flows.production.postgresql import PostgreSQL
 from flows.production.site import Database, Site
-from tests.e2e.production import database, site_command
+from tests.e2e.production import ROOT, UNNEEDED, new, site_command
 
 pytestmark = pytest.mark.e2e
 
+WITHIN_S = 10.0
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 HEADLESS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -67,13 +74,18 @@ def test_the_same_run_again_finds_all_its_stages(deployed, first_run, scene, tmp
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium or google-chrome is installed")
-def test_the_page_of_a_run_is_a_picture_that_is_not_blank(deployed, first_run, tmp_path):
+def test_the_page_of_a_run_has_its_name_and_is_not_blank(deployed, first_run, tmp_path):
     run, _ = first_run
     picture = tmp_path / "run.png"
     page = deployed.url.removesuffix("/api") + f"/runs/flow-run/{run}?tab=Artifacts"
-    places = (f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}")
-    words = [CHROMIUM, *HEADLESS, *places, page]
-    subprocess.run(words, check=True, capture_output=True, timeout=120.0)
+
+    def browse(option):
+        words = [CHROMIUM, *HEADLESS, f"--user-data-dir={tmp_path / 'profile'}", option, page]
+        done = subprocess.run(words, check=True, capture_output=True, text=True, timeout=120.0)
+        return done.stdout
+
+    assert deployed.ask(f"/flow_runs/{run}")["name"] in browse("--dump-dom")
+    browse(f"--screenshot={picture}")
     with Image.open(picture) as opened:
         pixels = np.asarray(opened.convert("RGB")).reshape(-1, 3)
     assert len(pixels) == 1400 * 1000
@@ -124,10 +136,60 @@ def test_schedules_make_runs_and_those_of_data_sets_wait_for_their_roots(deploye
         assert variable in found["description"]
 
 
-def test_what_runs_without_a_heartbeat_is_watched(deployed):
-    [automation] = deployed.ask("/automations/filter", {})
+@pytest.fixture
+def watched(deployed):
+    """Beside the automation of heartbeats, which is there, one that waits only ten seconds."""
+    zombies = yaml.safe_load((ROOT / "deployments" / "zombies.yaml").read_text())
+    named = {"automations": {"name": {"any_": [zombies["name"]]}}}
+    [automation] = deployed.ask("/automations/filter", named)
     assert automation["enabled"]
-    assert automation["actions"][0]["state"] == "CRASHED"
+    zombies["name"] = "at-once"
+    zombies["trigger"]["within"] = WITHIN_S
+    made = deployed.ask("/automations/", zombies)
+    yield
+    ask(deployed.url, f"/automations/{made['id']}", method="DELETE")
+
+
+def test_a_run_whose_heartbeats_stop_is_crashed_and_one_that_goes_on_is_not(deployed, watched):
+    def start():
+        flow = deployed.ask("/flows/", {"name": "by-hand"})
+        run = {"flow_id": flow["id"], "state": {"type": "RUNNING"}}
+        return deployed.ask("/flow_runs/", run)["id"]
+
+    def heartbeat(run):
+        event = {
+            "id": str(uuid4()),
+            "occurred": datetime.now(UTC).isoformat(),
+            "event": "prefect.flow-run.heartbeat",
+            "resource": {"prefect.resource.id": f"prefect.flow-run.{run}"},
+        }
+        deployed.ask("/events", [event])
+
+    stops, goes_on = start(), start()
+    heartbeat(stops)
+    end = time.monotonic() + 6 * WITHIN_S
+    while deployed.state(stops) == "RUNNING" and time.monotonic() < end:
+        heartbeat(goes_on)
+        time.sleep(1.0)
+    assert deployed.state(stops) == "CRASHED"
+    assert deployed.state(goes_on) == "RUNNING"
+    deployed.ask(f"/flow_runs/{goes_on}/set_state", {"state": {"type": "COMPLETED"}})
+
+
+@pytest.mark.parametrize("variable", ["env", "command", "working_dir"])
+def test_who_starts_a_run_cannot_change_its_process(variable, deployed):
+    value = {"env": '{"MOCOFLOW_DATA_ROOTS": ""}', "command": "id", "working_dir": "/etc"}
+    asked = ("--job-variable", f"{variable}={value[variable]}")
+    with pytest.raises(AssertionError) as refused:
+        deployed.prefect("deployment", "run", "mocoflow/fast", *asked)
+    assert f"('{variable}' was unexpected)" in " ".join(str(refused.value).split())
+
+
+def test_the_worker_is_remembered_for_its_owner_and_without_passwords(deployed):
+    noted = deployed.site.folder / "worker.json"
+    assert noted.stat().st_mode & 0o077 == 0
+    assert "MOCOFLOW_DATA_ROOTS" in noted.read_text()
+    assert UNNEEDED not in noted.read_text()
 
 
 def test_up_again_changes_nothing_that_runs(deployed):
@@ -141,9 +203,23 @@ def test_up_again_changes_nothing_that_runs(deployed):
     assert deployed.url in said
 
 
-@pytest.mark.skipif(database() != Database.POSTGRESQL, reason="PostgreSQL is not installed")
-def test_the_database_is_asked_for_its_password(deployed):
-    url = PostgreSQL(deployed.site).url.removeprefix("postgresql+asyncpg://")
+@pytest.fixture
+def cluster(deployed):
+    if deployed.site.database != Database.POSTGRESQL:
+        pytest.skip("PostgreSQL is not installed")
+    return PostgreSQL(deployed.site)
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="environments are not shown")
+def test_the_database_sees_none_of_the_passwords_of_who_started_it(cluster):
+    process = (cluster.data / "postmaster.pid").read_text().split()[0]
+    seen = Path(f"/proc/{process}/environ").read_text().split("\0")
+    assert any(variable.startswith("PATH=") for variable in seen)
+    assert not [variable for variable in seen if variable.startswith((UNNEEDED, "PREFECT_"))]
+
+
+def test_the_database_is_asked_for_its_password(cluster):
+    url = cluster.url.removeprefix("postgresql+asyncpg://")
     address, name = url.partition("@")[2].split("/")
     host, port = address.split(":")
     psql = shutil.which("psql") or pytest.skip("no psql")
@@ -156,4 +232,4 @@ def test_the_database_is_asked_for_its_password(deployed):
 def test_another_site_on_a_taken_port_is_refused(deployed, tmp_path):
     other = Site(tmp_path / "other", deployed.site.port)
     with pytest.raises(AssertionError, match="a free port for the server"):
-        site_command(deployed, other, "up")
+        site_command(deployed, other, "up", *new(other))

@@ -66,6 +66,14 @@ def test_a_process_that_has_ended_by_itself_is_not_running(site):
     assert not is_running(site, "one")
 
 
+def test_a_process_is_found_again_from_another_time_zone(site, monkeypatch):
+    monkeypatch.setenv("TZ", "Asia/Tokyo")
+    start(site, "one", SLEEPS, environment(site))
+    monkeypatch.setenv("TZ", "America/New_York")
+    assert is_running(site, "one")
+    assert stop(site, "one")
+
+
 @pytest.mark.skipif(not HAS_PROC, reason="this system does not show environments of processes")
 def test_what_was_left_behind_is_found_and_ended(site, tmp_path):
     process = start(site, "one", SLEEPS, environment(site))

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from flows.production.postgresql import find_programs
-from flows.production.site import AUTHENTICATION, Database, Site
+from flows.production.site import AUTHENTICATION, WORKER_VARIABLES, Database, Site
 from flows.production.up import bring_up
 from mocoflow_core.errors import InputError
 
@@ -17,6 +17,46 @@ def test_a_site_is_found_again_in_its_folder(tmp_path):
     site = Site(tmp_path, 4321, Database.POSTGRESQL)
     site.save()
     assert Site.of_folder(tmp_path) == site
+
+
+def test_a_site_keeps_its_database_and_its_port(tmp_path):
+    new = Site.asked_for(tmp_path)
+    assert (new.port, new.database) == (4200, Database.SQLITE)
+    made = Site.asked_for(tmp_path, 4321, Database.POSTGRESQL)
+    made.save()
+    assert Site.asked_for(tmp_path) == made
+    assert Site.asked_for(tmp_path, 4321, Database.POSTGRESQL) == made
+    assert Site.asked_for(tmp_path, port=4322) == Site(tmp_path, 4322, Database.POSTGRESQL)
+
+
+def test_a_site_is_not_given_an_empty_database_in_place_of_its_own(tmp_path):
+    Site(tmp_path, 4321, Database.POSTGRESQL).save()
+    with pytest.raises(InputError, match=r"postgresql, in which .* keeps its runs, got sqlite"):
+        Site.asked_for(tmp_path, database=Database.SQLITE)
+
+
+@pytest.mark.parametrize("empty", ["", ":", "::"])
+def test_an_empty_variable_lifts_no_confinement(empty, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    for name in WORKER_VARIABLES:
+        monkeypatch.setenv(name, empty if name == "MOCOFLOW_DATA_ROOTS" else "")
+    found = Site(tmp_path).environment()
+    assert found["MOCOFLOW_DATA_ROOTS"] == str(tmp_path / "mocoflow" / "data")
+    assert found["MOCOFLOW_RESULTS_ROOT"] == str(tmp_path / "mocoflow" / "results")
+    assert not {"MOCOFLOW_STORE", "MOCOFLOW_AIST_ROOT"} & found.keys()
+
+
+def test_a_relative_folder_is_the_same_for_a_worker_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MOCOFLOW_AIST_ROOT", "sets/aist")
+    monkeypatch.setenv("MOCOFLOW_DATA_ROOTS", "films::/mnt/films")
+    monkeypatch.setenv("MOCOFLOW_STORE", "store")
+    found = Site(tmp_path).environment()
+    assert found["MOCOFLOW_AIST_ROOT"] == str(tmp_path / "sets" / "aist")
+    assert found["MOCOFLOW_DATA_ROOTS"] == f"{tmp_path / 'films'}:/mnt/films"
+    assert found["MOCOFLOW_STORE"] == str(tmp_path / "store")
+    monkeypatch.setenv("MOCOFLOW_STORE", "s3://bucket/store")
+    assert Site(tmp_path).environment()["MOCOFLOW_STORE"] == "s3://bucket/store"
 
 
 def test_runs_are_confined_unless_the_user_has_said_where(tmp_path, monkeypatch):
@@ -35,6 +75,8 @@ def test_a_password_of_the_server_is_passed_on_to_its_clients(tmp_path, monkeypa
     assert "PREFECT_API_AUTH_STRING" not in Site(tmp_path).environment()
     monkeypatch.setenv(AUTHENTICATION, "me:secret")
     assert Site(tmp_path).environment()["PREFECT_API_AUTH_STRING"] == "me:secret"
+    monkeypatch.setenv(AUTHENTICATION, "")
+    assert not {AUTHENTICATION, "PREFECT_API_AUTH_STRING"} & Site(tmp_path).environment().keys()
 
 
 def test_without_postgresql_it_is_said_what_to_install(monkeypatch):
