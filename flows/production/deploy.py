@@ -88,10 +88,14 @@ def _set_schedules(client: SyncPrefectClient, asked: Mapping[str, Any]) -> Itera
     """Pause or resume the schedules of a data set's deployment; say how each one is."""
     name = asked["name"]
     missing = _missing_root(name) if name in ROOTS else None
-    [deployment] = [found for found in client.read_deployments() if found.name == name]
+    [deployment] = [
+        found
+        for found in client.read_deployments()
+        if (found.name, found.entrypoint) == (name, asked["entrypoint"])
+    ]
+    title = f"{client.read_flow(deployment.flow_id).name}/{name}"
     for schedule in deployment.schedules if name in ROOTS else ():
         client.update_deployment_schedule(deployment.id, schedule.id, active=not missing)
-    title = f"{client.read_flow(deployment.flow_id).name}/{name}"
     for schedule in asked["schedules"]:
         runs = schedule["active"] or name in ROOTS
         state = f"paused: {missing}" if missing else "runs" if runs else "paused"

@@ -12,6 +12,7 @@ from http import HTTPStatus
 from typing import Any
 from urllib.error import HTTPError
 
+from flows.allowed_addresses import CLUSTER_ADDRESSES
 from flows.production.api import admits, answers, ask, wait_for
 from flows.production.postgresql import PostgreSQL
 from flows.production.processes import end_what_is_left, is_running, start, stop
@@ -23,6 +24,8 @@ RUNS_AT_ONCE = 2
 # A first start on a busy machine.
 STARTS_WITHIN_S = 300.0
 WORKER_SETTINGS = "worker.json"
+# What a worker was told when it was started.
+COMPARED = (*WORKER_VARIABLES, CLUSTER_ADDRESSES)
 UNDER_WAY = ("RUNNING", "PENDING", "CANCELLING")
 
 
@@ -159,7 +162,7 @@ def _require_the_same_worker(site: Site) -> None:
     if not is_running(site, "worker"):
         return
     before, now = json.loads((site.folder / WORKER_SETTINGS).read_text()), _settings(site)
-    differ = [name for name in WORKER_VARIABLES if before.get(name) != now.get(name)]
+    differ = [name for name in COMPARED if before.get(name) != now.get(name)]
     if differ:
         raise InputError(
             "the settings that the running worker was started with",
@@ -180,7 +183,7 @@ def _require_the_same_password(site: Site) -> None:
 
 
 def _settings(site: Site) -> dict[str, str]:
-    return {n: v for n, v in site.environment().items() if n in WORKER_VARIABLES}
+    return {n: v for n, v in site.environment().items() if v and n in COMPARED}
 
 
 def _write_settings(site: Site) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,6 +24,15 @@ long_lived = pytest.mark.parametrize("name", [name for name in SERVICES if name 
 
 def is_ours(service):
     return "build" in service
+
+
+def test_the_file_is_one_by_compose_s_own_schema():
+    words = ["check-jsonschema", "--builtin-schema", "vendor.compose-spec"]
+    program = Path(sys.executable).with_name(words[0])
+    done = subprocess.run(
+        [program, *words[1:], ROOT / "docker-compose.yml"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout
 
 
 @services

@@ -10,6 +10,7 @@ from flows.production.deploy import _set_schedules
 
 ASKED = {
     "name": "aist",
+    "entrypoint": "ours",
     "schedules": [{"cron": "0 1 * * 6", "timezone": "Etc/UTC", "active": False}],
 }
 
@@ -22,7 +23,11 @@ class Client:
 
     def read_deployments(self):
         schedule = SimpleNamespace(id="schedule")
-        return [SimpleNamespace(name="aist", id="aist", flow_id="flow", schedules=[schedule])]
+        theirs = SimpleNamespace(name="aist", entrypoint="theirs", schedules=[])
+        ours = SimpleNamespace(
+            name="aist", entrypoint="ours", id="aist", flow_id="flow", schedules=[schedule]
+        )
+        return [theirs, ours]
 
     def read_flow(self, _):
         return SimpleNamespace(name="benchmark")
