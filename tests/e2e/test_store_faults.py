@@ -144,10 +144,12 @@ def storage():
 
 
 def test_a_run_killed_while_it_uploads_is_finished_by_another_machine(scene, storage, tmp_path):
-    """Object storage; machines are caches of their own."""
+    """Object storage; machines are caches and states of their own."""
     url = "s3://killed/store"
     here, there = (
-        storage.environment | {"XDG_CACHE_HOME": str(tmp_path / name)} for name in ("here", "there")
+        storage.environment
+        | {f"XDG_{kind}_HOME": str(tmp_path / name / kind) for kind in ("CACHE", "STATE")}
+        for name in ("here", "there")
     )
     first = started(*reconstruct(scene, tmp_path / "run", url), environment=here)
     files = storage.files()
