@@ -45,10 +45,16 @@ def benchmark(deployed, folder: Path, scenes: list[Path], *words: str):
     # What is scored takes longer than all the rest.
     asked += ["--set", "evaluation.frames_per_camera=1"]
     places = ["--out", str(folder / "out"), "--store", str(folder / "store")]
+    # With the worker's folders it may speak to what it is told alone.
+    told = (
+        {"MOCOFLOW_CLUSTER_ADDRESSES": words[words.index("--dask") + 1]}
+        if "--dask" in words
+        else {}
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", MAIN, "benchmark", *asked, *places, *words],
         cwd=ROOT,
-        env={**deployed.environment, "OMP_NUM_THREADS": "1"},
+        env={**deployed.environment, **told, "OMP_NUM_THREADS": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
