@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from prefect import flow
 
 from flows.benchmark_request import BenchmarkRequest
+from flows.misplaced_scenes import misplaced_scenes
 from flows.parameters import (
     Budget,
     ExperimentName,
@@ -27,7 +27,6 @@ from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
 from mocoflow_core.methods.past_benchmarks import past_nights
 from mocoflow_core.presets import Preset
 from tasks.collect_cells import collect_cells
-from tasks.misplace_views import misplace_views
 from tasks.source import folder_source
 from tasks.write_benchmark import write_benchmark
 
@@ -108,7 +107,8 @@ def benchmark(
         slots=slots,
     )
     folder, where = request.claim(), request.store
-    cells = run_cells(request.cells(), request.runs_on)
+    misplaced, unread = misplaced_scenes(request)
+    cells = (*run_cells(request.cells(), request.runs_on), *unread)
 
     done = [cell for cell in cells if cell.state == "finished"]
     files = folder_source(
@@ -116,7 +116,7 @@ def benchmark(
     )
     records = [cell.model_dump(mode="json") for cell in cells]
     tables = collect_cells(
-        where, files, records, list(request.methods), request.waited_for, misplaced_rows(request)
+        where, files, records, list(request.methods), request.waited_for, misplaced
     )
     past = [row._asdict() for row in past_nights(folder.path, folder.begun)]
     page = write_benchmark(where, tables, records, request.command, request.experiment, past)
@@ -132,19 +132,6 @@ def benchmark(
     record = folder.finish({"cells": cells, **found})
     show_benchmark_in_prefect(record, folder.path / "benchmark.html", chart)
     tell_of_regressions(record, folder.path / "benchmark.html")
-    if cells and not done:
+    if cells and not done and not misplaced:
         raise NothingFinished(f"none of {len(cells)} runs finished: {folder.path}/benchmark.html")
     return record
-
-
-def misplaced_rows(request: BenchmarkRequest) -> list[dict[str, Any]]:
-    """What scores make of misplaced views of each scene, where the experiment asks for it."""
-    measured = [
-        misplace_views(
-            *(request.store, shown.recording, shown.others, name),
-            *(shown.configuration.capture, shown.configuration.evaluation),
-            shown.configuration.person_scores,
-        )
-        for name, shown in request.shifted_scenes()
-    ]
-    return [row for artifact in measured for row in artifact.summary["rows"]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -80,24 +79,29 @@ def benchmark(
     from flows.benchmark import NothingFinished
     from flows.benchmark import benchmark as flow
 
-    with undisturbed(), suppress(NothingFinished):
-        flow(
-            out=request.out,
-            experiment=request.experiment,
-            scenes=request.scenes,
-            methods=request.methods,
-            presets=request.presets,
-            seeds=request.seeds,
-            budget_s=request.budget_s,
-            settings=request.settings,
-            targets=request.targets,
-            store=request.store_url,
-            afresh=request.afresh,
-            workers=request.workers,
-            dask=request.dask,
-            slots=request.slots,
-        )
+    exit_code = 0
+    try:
+        with undisturbed():
+            flow(
+                out=request.out,
+                experiment=request.experiment,
+                scenes=request.scenes,
+                methods=request.methods,
+                presets=request.presets,
+                seeds=request.seeds,
+                budget_s=request.budget_s,
+                settings=request.settings,
+                targets=request.targets,
+                store=request.store_url,
+                afresh=request.afresh,
+                workers=request.workers,
+                dask=request.dask,
+                slots=request.slots,
+            )
+    except NothingFinished:
+        exit_code = 1
     _tell_of(request.place)
+    sys.exit(exit_code)
 
 
 def _tell_of(place: Path) -> None:
@@ -112,5 +116,3 @@ def _tell_of(place: Path) -> None:
     for worse in record.regressions:
         typer.echo(f"Worse than usual: {worse['what']}: {worse['why']}", err=True)
     typer.echo(f"Benchmark: {place / 'benchmark.html'}")
-    if record.cells and not any(cell.state == "finished" for cell in record.cells):
-        sys.exit(1)

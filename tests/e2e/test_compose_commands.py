@@ -74,6 +74,7 @@ class Here:
         asked = {name: filled(value) for name, value in SERVICES[service]["environment"].items()}
         kept = ("PATH", "PYTHONPATH", "HOME")
         base = {name: os.environ[name] for name in kept if name in os.environ}
+        base["XDG_STATE_HOME"] = str(self.folder / "state")  # As the image's own.
         base["PYTHONPATH"] = os.pathsep.join((str(ROOT), base.get("PYTHONPATH", "")))
         base["PREFECT_HOME"] = str(self.folder / "state" / service)
         return base | asked | {n: v for n, v in self.places.items() if n in asked}

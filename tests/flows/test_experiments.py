@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,23 @@ def test_its_table_has_a_row_for_each_step_that_ran(series):
         "| with box",
     ]
     assert EXPERIMENTS["progressive"].title in (out / "benchmark.html").read_text()
+
+
+def test_a_scene_that_cannot_be_read_is_named_and_the_others_are_misplaced(
+    compare, toy_scene, tmp_path
+):
+    shutil.copytree(toy_scene, tmp_path / "torn")
+    frame = sorted((tmp_path / "torn/frames/cam00").iterdir())[0]
+    frame.unlink()
+    frame.symlink_to("nowhere")
+    scenes = (str(tmp_path / "torn"), str(toy_scene))
+    record = compare(tmp_path / "out", experiment="misalignment", scenes=scenes)
+    [unread] = record.cells
+    assert (unread.scene, unread.state) == ("torn", "failed")
+    assert frame.name in unread.reason
+    assert "torn" in (tmp_path / "out/table.md").read_text()
+    rows = read_misalignment(tmp_path / "out/misalignment.parquet")
+    assert {row.scene for row in rows} == {"toy"}
 
 
 def test_misplaced_views_need_no_run(compare, tmp_path):
