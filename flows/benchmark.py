@@ -107,8 +107,8 @@ def benchmark(
         slots=slots,
     )
     folder, where = request.claim(), request.store
+    cells = run_cells(request.cells(), request.runs_on)
     misplaced, unread = misplaced_scenes(request)
-    cells = (*run_cells(request.cells(), request.runs_on), *unread)
 
     done = [cell for cell in cells if cell.state == "finished"]
     files = folder_source(
@@ -119,7 +119,10 @@ def benchmark(
         where, files, records, list(request.methods), request.waited_for, misplaced
     )
     past = [row._asdict() for row in past_nights(folder.path, folder.begun)]
-    page = write_benchmark(where, tables, records, request.command, request.experiment, past)
+    page = write_benchmark(
+        *(where, tables, records, request.command, request.experiment),
+        *(past, [omission._asdict() for omission in unread]),
+    )
 
     for name in COLLECTED:
         folder.take(where.folder(tables) / name, name)
@@ -132,6 +135,7 @@ def benchmark(
     record = folder.finish({"cells": cells, **found})
     show_benchmark_in_prefect(record, folder.path / "benchmark.html", chart)
     tell_of_regressions(record, folder.path / "benchmark.html")
-    if cells and not done and not misplaced:
-        raise NothingFinished(f"none of {len(cells)} runs finished: {folder.path}/benchmark.html")
+    if (cells and not done) or (unread and not misplaced):
+        count = len(cells) + len(unread)
+        raise NothingFinished(f"none of {count} runs finished: {folder.path}/benchmark.html")
     return record

@@ -72,7 +72,7 @@ def benchmark(
         afresh=afresh,
         workers=workers,
         dask=dask,
-        slots=slots,
+        slots=slots or None,
     )
     request.claim()
     set_environment()

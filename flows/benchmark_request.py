@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from flows.allowed_folders import AllowedFolders
-from flows.benchmark_scenes import AskedScene, read_scenes
+from flows.benchmark_scenes import AskedScene, in_full, read_scenes
+from flows.reasons import reason_of
 from flows.request import Request
 from flows.users_store import open_users_store
 from flows.workers import Workers
@@ -100,7 +101,7 @@ class BenchmarkRequest(BaseModel):
     @property
     def command(self) -> str:
         """The command line that asks for the same."""
-        words = ["mocoflow", "benchmark", *self._asked(), "--out", str(self.out)]
+        words = ["mocoflow", "benchmark", *self._asked(self.scenes), "--out", str(self.out)]
         words += ["--store", self.store_url] if self.store_url else []
         words += ["--afresh"] if self.afresh else []
         return shlex.join([*words, *self.runs_on.words])
@@ -108,11 +109,11 @@ class BenchmarkRequest(BaseModel):
     @property
     def question(self) -> str:
         """What is asked, and on what it runs; where the results go decides nothing."""
-        return shlex.join([*self._asked(), *self.runs_on.words])
+        return shlex.join([*self._asked(map(in_full, self.scenes)), *self.runs_on.words])
 
-    def _asked(self) -> list[str]:
+    def _asked(self, scenes: Iterable[str]) -> list[str]:
         words = ["--experiment", self.experiment] if self.experiment else []
-        words += ["--scenes", *self.scenes]
+        words += ["--scenes", *scenes]
         words += ["--methods", *self.methods] if self.methods else []
         words += ["--presets", *self.presets, "--seeds", str(self.seeds)]
         if self.budget_s is not None:
@@ -146,16 +147,20 @@ class BenchmarkRequest(BaseModel):
                     for seed in range(self.seeds):
                         yield self._cell(scene, preset, method, seed)
 
-    def shifted_scenes(self) -> Iterator[tuple[str, Request]]:
-        """The scenes whose photographs are scored misplaced, with what they are extracted by."""
-        for scene in self.asked_scenes if self.compares.shifts_views else ():
-            yield scene.name, self._request(scene, self.presets[0], (), 0)
+    @property
+    def shifted_scenes(self) -> tuple[AskedScene, ...]:
+        """Those whose photographs are scored misplaced."""
+        return self.asked_scenes if self.compares.shifts_views else ()
+
+    def shifted(self, scene: AskedScene) -> Request:
+        """What one of them is extracted by. Raises what keeps the scene from being made."""
+        return self._request(scene, scene.folder(), self.presets[0], (), 0)
 
     def _request(
-        self, scene: AskedScene, preset: str, changes: tuple[str, ...], seed: int
+        self, scene: AskedScene, folder: Path, preset: str, changes: tuple[str, ...], seed: int
     ) -> Request:
         return Request(
-            scene_path=scene.folder().resolve(),
+            scene_path=folder.resolve(),
             preset=preset,
             seed=seed,
             budget_s=self.budget_s,
@@ -166,7 +171,8 @@ class BenchmarkRequest(BaseModel):
 
     def _cell(self, scene: AskedScene, preset: str, method: str, seed: int) -> Cell:
         folder = f"cells/{scene.name}/{preset}/{method}/{seed}"
-        refusal = self._refusal(preset, method)
+        place, fault = _made(scene)
+        refusal = fault or self._refusal(preset, method)
         record = CellRecord(
             scene=scene.name,
             preset=preset,
@@ -175,9 +181,9 @@ class BenchmarkRequest(BaseModel):
             folder=folder,
             # Failed until it is known to have finished.
             state="refused" if refusal else "failed",
-            reason=str(refusal or ""),
+            reason=reason_of(refusal) if refusal else "",
         )
-        request = self._request(scene, preset, SETTINGS[method], seed)
+        request = self._request(scene, place, preset, SETTINGS[method], seed)
         return Cell(record, request, self.place.resolve() / folder)
 
     def _refusal(self, preset: str, method: str) -> InputError | None:
@@ -221,6 +227,14 @@ class BenchmarkRequest(BaseModel):
         if refusals and all(refusals):
             raise next(filter(None, refusals))
         self.runs_on.check()
+
+
+def _made(scene: AskedScene) -> tuple[Path, Exception | None]:
+    """Where a scene lies, and what kept it from being made, which is the end of no other."""
+    try:
+        return scene.folder(), None
+    except Exception as error:
+        return Path(scene.where), error
 
 
 def _all_known(option: str, given: tuple[str, ...], known: tuple[str, ...]) -> None:

@@ -51,10 +51,23 @@ def read_scenes(words: Iterable[str]) -> tuple[AskedScene, ...]:
     return tuple(scenes.values())
 
 
-def _read(word: str) -> Iterator[AskedScene]:
+def in_full(word: str) -> str:
+    """The same scene in a word that means the same in every working directory."""
+    where, camera = _parts(word)
+    if not _is_folder(where):
+        return word
+    folder = AllowedFolders.of_environment().to_read(Path(where), "scenes").resolve()
+    return f"{folder}@{camera}" if camera else str(folder)
+
+
+def _parts(word: str) -> tuple[str, str]:
+    """Where a scene is, and the camera that is to be learned from, if one is named."""
     where, at, camera = word.rpartition("@")
-    if not at or Path(word).is_dir():
-        where, camera = word, ""
+    return (word, "") if not at or Path(word).is_dir() else (where, camera)
+
+
+def _read(word: str) -> Iterator[AskedScene]:
+    where, camera = _parts(word)
     behind = f"@{camera}" if camera else ""
     if _is_folder(where):
         folder = AllowedFolders.of_environment().to_read(Path(where), "scenes")

@@ -6,7 +6,8 @@ from prefect import task
 from prefect.cache_policies import NO_CACHE
 
 from flows.benchmark_request import Cell
-from flows.run_cell import reason_of, run_cell
+from flows.reasons import reason_of
+from flows.run_cell import run_cell
 from mocoflow_core.io.run_folder import RUN
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from tasks.inner_runs import crash_inner_runs

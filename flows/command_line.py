@@ -121,7 +121,7 @@ def reconstruct(
             devices=devices,
             machines=machines,
             rendezvous=rendezvous,
-            slots=slots,
+            slots=slots or None,
         )
     typer.echo(f"Report: {out / 'report.html'}")
 

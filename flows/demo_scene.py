@@ -44,6 +44,10 @@ def _make(configuration: SyntheticConfig, folder: Path) -> None:
     try:
         with terminal_bar(f"synth {configuration.name}") as progress:
             write_scene(configuration, beside, progress)
-        beside.rename(folder)
+        try:
+            beside.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # Unless another process has made the same meanwhile.
+                raise
     finally:
         rmtree(beside, ignore_errors=True)  # Gone already where all went well.

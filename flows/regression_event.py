@@ -18,6 +18,7 @@ def tell_of_regressions(record: BenchmarkRecord, page: Path) -> None:
     """Emit the event where something is worse than usual, with what and why as text."""
     if not record.regressions:
         return
+    name = page.resolve().parent.name
     worse = [f"{plain(str(row['what']))}: {plain(str(row['why']))}" for row in record.regressions]
     run = {
         "prefect.resource.id": f"prefect.flow-run.{flow_run.id}",
@@ -26,8 +27,8 @@ def tell_of_regressions(record: BenchmarkRecord, page: Path) -> None:
     emit_event(
         event=EVENT,
         resource={
-            "prefect.resource.id": f"mocoflow.benchmark.{page.parent.name}",
-            "prefect.resource.name": page.parent.name,
+            "prefect.resource.id": f"mocoflow.benchmark.{name}",
+            "prefect.resource.name": name,
         },
         related=[run],
         payload={"text": "\n".join(worse), "page": str(page), "command": record.command},

@@ -9,9 +9,9 @@ from prefect.context import FlowRunContext
 from prefect.exceptions import Abort
 
 from flows.benchmark_request import Cell
+from flows.reasons import reason_of
 from flows.reconstruct import reconstruct
 from flows.slots import held_slot
-from mocoflow_core.errors import InputError
 from mocoflow_core.io.run_folder import RunRecord, read_run
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from tasks.cancellation import RunCancelled, confirm_cancelled
@@ -82,12 +82,6 @@ def _reason(state: State[RunRecord], error: object) -> str:
     if isinstance(error, BaseException):
         return reason_of(error)
     return " ".join((state.message or str(state.name)).split())
-
-
-def reason_of(error: BaseException) -> str:
-    """Why it ended, on one line; bad input speaks for itself, other errors say what they are."""
-    text = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-    return " ".join(text.split())
 
 
 def _is_finished(cell: Cell) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from importlib.util import find_spec
 
 from pydantic import BaseModel, ConfigDict
@@ -36,6 +37,10 @@ class Workers(BaseModel):
                 "A benchmark runs on --workers here or on a --dask cluster",
                 f"--workers {self.count} --dask {self.dask}",
                 "Leave one out; the cluster has its own workers.",
+            )
+        if not re.search(r":\d+$", self.dask):
+            raise InputError(
+                "--dask must be an address with its port", repr(self.dask), "As tcp://HOST:8786."
             )
         require_allowed_address(self.dask, "dask")
         if find_spec("prefect_dask") is None:

@@ -10,10 +10,11 @@ from uuid import UUID
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import FlowRunContext, TaskRunContext
 
+from mocoflow_core.progress import Progress
 from mocoflow_core.report.markdown_text import plain
 from tasks.cancellation import end_if_cancelled
 from tasks.server import if_the_server_answers
-from tasks.terminal_bar import Progress, terminal_bar
+from tasks.terminal_bar import terminal_bar
 
 # Each update is an event that Prefect keeps for days.
 SECONDS_BETWEEN_UPDATES = 5.0
@@ -26,7 +27,7 @@ def showing_progress(
     """A callback (fraction in [0, 1], short text) for the body of a stage, or of a run's import.
 
     ``note_time`` is called now and then, so that a killed stage knows what it has cost. Raises
-    RunCancelled out of the callback when somebody has cancelled the flow run.
+    RunCancelled out of a stage's callback when somebody has cancelled its flow run.
     """
     shown = TaskRunContext.get() or FlowRunContext.get()
     artifact = ProgressArtifact(stage) if shown else None

@@ -22,9 +22,9 @@ from mocoflow_core.artifacts import Artifact
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.io.content_key import key_of
 from mocoflow_core.io.store import Store
-from mocoflow_core.progress import part_of
+from mocoflow_core.progress import Progress, part_of
 from mocoflow_core.threads import torch_threads
-from tasks.progress import Progress, showing_progress
+from tasks.progress import showing_progress
 from tasks.source import Source
 from tasks.terminal_bar import terminal_line
 

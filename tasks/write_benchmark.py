@@ -17,6 +17,7 @@ from mocoflow_core.report.benchmark_chart import write_benchmark_chart
 from mocoflow_core.report.benchmark_page import write_benchmark_page
 from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.markdown_tables import write_markdown_tables
+from mocoflow_core.report.omissions import Omission
 from tasks.stage import Stage, Summary, stage
 
 ALGORITHM_VERSION = 5  # The nights before.
@@ -30,10 +31,12 @@ def write_benchmark(
     command: str,
     experiment: str | None,
     past: list[dict[str, JsonValue]],
+    unread: list[dict[str, str]],
 ) -> Summary:
     """Error against run time with median and range, scores, time to target, omissions, machine.
 
-    And how this night compares with those before: ``past``, as rows of the history.
+    And how this night compares with those before: ``past``, as rows of the history. ``unread`` are
+    omissions that no cell tells of.
 
     Output: ``benchmark.html``, ``table.md``, ``history.parquet``, and ``error_against_time.png``
     where a cell finished. Seconds.
@@ -46,6 +49,7 @@ def write_benchmark(
         times=read_times(held / "time_to_target.parquet"),
         misplaced=read_misalignment(held / "misalignment.parquet"),
         experiment=USUAL if experiment is None else EXPERIMENTS[experiment],
+        unread=[Omission(**omission) for omission in unread],
         past=[HistoryRow(**row) for row in past],  # type: ignore[arg-type]
     )
     write_benchmark_chart(results.curves, work.folder / "error_against_time.png")

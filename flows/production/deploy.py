@@ -35,13 +35,14 @@ def deploy() -> list[str]:
         for queue in pool["queues"]:
             _make_queue(client, pool["name"], queue)
         make_automation(client, _read("zombies.yaml"))
-        told = make_notifications(client, _read("notifications.yaml")["automations"])
         _deploy_flows()
         schedules = [
             line
             for deployment in _read("prefect.yaml")["deployments"]
             for line in _set_schedules(client, deployment)
         ]
+        # Last: a block that is not there must keep no deployment away.
+        told = make_notifications(client, _read("notifications.yaml")["automations"])
     return [*schedules, told]
 
 
@@ -85,7 +86,7 @@ def _deploy_flows() -> None:
 
 
 def _set_schedules(client: SyncPrefectClient, asked: Mapping[str, Any]) -> Iterator[str]:
-    """Pause or resume the schedules of a data set's deployment; say how each one is."""
+    """Keep the schedules of the file alone, a data set's paused without it; say how each is."""
     name = asked["name"]
     missing = _missing_root(name) if name in ROOTS else None
     [deployment] = [
@@ -94,8 +95,12 @@ def _set_schedules(client: SyncPrefectClient, asked: Mapping[str, Any]) -> Itera
         if (found.name, found.entrypoint) == (name, asked["entrypoint"])
     ]
     title = f"{client.read_flow(deployment.flow_id).name}/{name}"
-    for schedule in deployment.schedules if name in ROOTS else ():
-        client.update_deployment_schedule(deployment.id, schedule.id, active=not missing)
+    named = {schedule["slug"] for schedule in asked["schedules"]}
+    for schedule in deployment.schedules:
+        if schedule.slug not in named:  # Of an earlier version, which `prefect deploy` leaves.
+            client.delete_deployment_schedule(deployment.id, schedule.id)
+        elif name in ROOTS:
+            client.update_deployment_schedule(deployment.id, schedule.id, active=not missing)
     for schedule in asked["schedules"]:
         runs = schedule["active"] or name in ROOTS
         state = f"paused: {missing}" if missing else "runs" if runs else "paused"

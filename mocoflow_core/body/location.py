@@ -76,11 +76,10 @@ def locate_body(
     confidence = confidence * kept
     translations = path - centres
 
-    def mismatch(bodies: Array) -> float:
-        return unexplained(clip, searched, bodies, ingested.meshes.faces, configuration)
-
-    reached = mismatch(posed[rows] + translations[rows, None])
-    given = mismatch(posed[rows]) if ingested.located else math.inf
+    crops = [grid_crop(clip.masks[position], clip, configuration) for position in searched]
+    faces = ingested.meshes.faces
+    reached = unexplained(crops, posed[rows] + translations[rows, None], faces)
+    given = unexplained(crops, posed[rows], faces) if ingested.located else math.inf
     adopted = configuration.least_gain == 0 or reached < (1 - configuration.least_gain) * given
     if not adopted:
         translations = np.zeros_like(translations)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,23 +40,16 @@ def placement_confidence(
     return trust * in_sight**configuration.cut_power
 
 
-def unexplained(
-    clip: Clip,
-    searched: NDArray[np.int64],
-    bodies: Array,
-    faces: NDArray[np.int32],
-    configuration: LocationConfig,
-) -> float:
+def unexplained(crops: Sequence[MaskCrop], bodies: Array, faces: NDArray[np.int32]) -> float:
     """Mean share of the masks and bodies together where only one of both is.
 
     In the mean over the frames, so that a few that are far off count.
 
     Args:
-        bodies: (S, V, 3) of the frames ``searched`` (S,), in the camera's axes.
+        bodies: (S, V, 3) in the camera's axes, one for each crop.
     """
     overlaps = [
-        crop_overlap(points, faces, grid_crop(clip.masks[position], clip, configuration))
-        for position, points in zip(searched.tolist(), bodies, strict=True)
+        crop_overlap(points, faces, crop) for points, crop in zip(bodies, crops, strict=True)
     ]
     return 1 - float(np.mean(overlaps))
 

@@ -18,9 +18,8 @@ from mocoflow_core.body.mask_misfit import MaskMisfit, MaskMisfitConfig, between
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.configuration import ConfigurationPart
+from mocoflow_core.progress import Progress
 from mocoflow_core.threads import torch_threads
-
-Progress = Callable[[float, str], None]
 
 # Gradients of whitened unknowns are of size one or more where they say anything; smaller ones are
 # not blown up to full steps.

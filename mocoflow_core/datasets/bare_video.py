@@ -18,10 +18,11 @@ from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.video_facts import read_video_facts
 from mocoflow_core.perception.blazepose import BlazePose
 from mocoflow_core.perception.own_networks import own_segmenter
+from mocoflow_core.progress import Progress
 from mocoflow_core.video.camera_check import require_movement, require_still_camera
 from mocoflow_core.video.clip_frames import ClipFrames, choose_frames
 from mocoflow_core.video.configuration import VideoConfig
-from mocoflow_core.video.followed_person import FollowedPerson, Progress, follow_person
+from mocoflow_core.video.followed_person import FollowedPerson, follow_person
 from mocoflow_core.video.lens import camera_of_video
 from mocoflow_core.video.person_masks import PackedMasks, make_plate, mask_person
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,9 +13,9 @@ from mocoflow_core.datasets.kinds import DatasetKind
 from mocoflow_core.datasets.write_dataset import require_new, write_dataset
 from mocoflow_core.errors import InputError
 from mocoflow_core.named_files import require_networks
+from mocoflow_core.progress import Progress
 from mocoflow_core.settings import with_settings
 
-Progress = Callable[[float, str], None]
 # Counts up when the same files give another scene folder.
 ALGORITHM_VERSION = 3  # A video's frames that may be held out are not looked at.
 

@@ -17,9 +17,8 @@ from mocoflow_core.datasets.people_snapshot import PeopleSnapshotConfig, read_pe
 from mocoflow_core.datasets.snapshot_files import missing_parts as missing_in_people_snapshot
 from mocoflow_core.datasets.zju_annotations import missing_parts as missing_in_zju_mocap
 from mocoflow_core.datasets.zju_mocap import ZjuMocapConfig, read_zju_mocap
+from mocoflow_core.progress import Progress
 from mocoflow_core.video.configuration import VideoConfig
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
@@ -25,8 +25,8 @@ from mocoflow_core.capture.scene_description import (
 from mocoflow_core.datasets.dataset_scene import DatasetCamera, DatasetScene, DatasetTruth
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.full_disk import full_disk_is_bad_input
+from mocoflow_core.progress import Progress
 
-Progress = Callable[[float, str], None]
 # What was imported, how, and what was found; for people, nothing reads it back.
 IMPORT_RECORD = "import.json"
 _COMPRESSION = [cv2.IMWRITE_PNG_COMPRESSION, 1]  # Fast; a third larger than the smallest.

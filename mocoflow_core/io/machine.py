@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from uuid import uuid4
 
@@ -26,6 +27,11 @@ def describe_machine() -> dict[str, JsonValue]:
         "system": platform.platform(terse=True),
         "python": platform.python_version(),
     }
+
+
+def described(machine: Mapping[str, JsonValue], names: Sequence[str]) -> str:
+    """Some facts of a machine in words: ``model AMD EPYC, cores 2``."""
+    return ", ".join(f"{name} {machine[name]}" for name in names if name in machine)
 
 
 def machine_id(file: Path) -> str:

@@ -76,11 +76,15 @@ class BenchmarkRecord(BaseModel):
     command: str
     question: str = ""  # the command without its places: nights that ask the same are compared
     finished: bool = False
-    finished_at: str = ""  # UTC, ISO 8601
+    finished_at: str = ""  # UTC, ISO 8601; empty where no cell has finished
     cells: tuple[CellRecord, ...] = ()
     summary: tuple[dict[str, JsonValue], ...] = ()
     omissions: tuple[dict[str, JsonValue], ...] = ()
     regressions: tuple[dict[str, JsonValue], ...] = ()
+
+    @property
+    def has_finished_cell(self) -> bool:
+        return any(cell.state == "finished" for cell in self.cells)
 
 
 @dataclass(frozen=True)
@@ -115,10 +119,14 @@ class BenchmarkFolder:
             beside.replace(self.path / name)
 
     def finish(self, values: Mapping[str, object]) -> BenchmarkRecord:
-        """Write ``benchmark.json``, the last file. One that was finished before keeps its time."""
-        moment = self.begun.finished_at or datetime.now(UTC).isoformat(timespec="seconds")
-        done = {**values, "finished": True, "finished_at": moment}
-        record = self.begun.model_copy(update=done)
+        """Write ``benchmark.json``, the last file.
+
+        The moment is that of the first time that there was anything to compare.
+        """
+        record = self.begun.model_copy(update={**values, "finished": True})
+        if record.has_finished_cell and not record.finished_at:
+            moment = datetime.now(UTC).isoformat(timespec="seconds")
+            record = record.model_copy(update={"finished_at": moment})
         with full_disk_is_bad_input(f"The folder {self.path}"):
             self._written(record)
         return record

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from mocoflow_core.capture.clip import Clip
 from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.io.pictures import as_bytes, write_picture
-from mocoflow_core.methods.rendered_views import Progress, TrainedRenderer
+from mocoflow_core.methods.rendered_views import TrainedRenderer
 from mocoflow_core.metrics.views import spread_frames
+from mocoflow_core.progress import Progress
 from mocoflow_core.rendering.surface_points import surface_points
 from mocoflow_core.rendering.trained_scene import TrainedScene
 

@@ -23,9 +23,9 @@ from mocoflow_core.io.glb import AnimatedMesh, write_glb
 from mocoflow_core.io.pictures import as_bytes
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.io.whole_file import whole_file
-from mocoflow_core.methods.rendered_views import Progress
 from mocoflow_core.methods.run_clip import RunClip
 from mocoflow_core.methods.surface_mesh import Points, SurfaceMesh, surface_mesh
+from mocoflow_core.progress import Progress
 from mocoflow_core.rendering.posed_scene import PosedScene
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.threads import torch_threads

@@ -19,8 +19,8 @@ from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
 from mocoflow_core.io.run_folder import RunRecord
 from mocoflow_core.io.video import write_video
 from mocoflow_core.methods.presentation import orbit
-from mocoflow_core.methods.rendered_views import Progress
 from mocoflow_core.methods.run_clip import RunClip
+from mocoflow_core.progress import Progress
 from mocoflow_core.rendering.trained_scene import TrainedScene
 from mocoflow_core.threads import torch_threads
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from mocoflow_core.io.machine import described
 from mocoflow_core.methods.benchmark_folder import (
     RECORD,
     BenchmarkRecord,
@@ -18,8 +19,8 @@ from mocoflow_core.metrics.history import SECONDS, HistoryRow
 
 # Nights that are shown; more are read by nobody.
 SHOWN_NIGHTS = 60
-# Of a machine's description: what decides how fast it is.
-MACHINE = ("model", "cores", "threads", "devices")
+# Of a machine's description.
+DECIDES_SPEED = ("model", "cores", "threads", "devices")
 
 
 def past_nights(own: Path, begun: BenchmarkRecord) -> list[HistoryRow]:
@@ -28,6 +29,7 @@ def past_nights(own: Path, begun: BenchmarkRecord) -> list[HistoryRow]:
     Those that were finished later than ``begun`` once was, where it was, are left out: what a
     night is compared with does not change afterwards.
     """
+    own = own.resolve()
     before = begun.finished_at or "~"  # Behind every moment.
     found = [
         record
@@ -35,7 +37,7 @@ def past_nights(own: Path, begun: BenchmarkRecord) -> list[HistoryRow]:
         if file.parent != own and (record := read_benchmark(file.parent)) is not None
     ]
     nights = sorted(
-        (r for r in found if r.finished and r.question == begun.question != ""),
+        (r for r in found if r.finished and r.finished_at and r.question == begun.question != ""),
         key=lambda record: record.finished_at,
     )
     earlier = [record for record in nights if record.finished_at < before]
@@ -77,8 +79,4 @@ def night_rows(
 
 
 def _machine(cells: Iterable[CellRecord]) -> str:
-    described = {
-        ", ".join(f"{name} {cell.machine[name]}" for name in MACHINE if name in cell.machine)
-        for cell in cells
-    }
-    return "; ".join(sorted(described))
+    return "; ".join(sorted({described(cell.machine, DECIDES_SPEED) for cell in cells}))

@@ -15,7 +15,7 @@ from mocoflow_core.geometry.camera import Camera
 from mocoflow_core.geometry.orbit import moved_around
 from mocoflow_core.io.pictures import as_bytes, write_picture
 from mocoflow_core.io.video import write_video
-from mocoflow_core.methods.rendered_views import Progress
+from mocoflow_core.progress import Progress
 from mocoflow_core.rendering.trained_scene import TrainedScene
 
 

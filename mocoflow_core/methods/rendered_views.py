@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -16,11 +16,11 @@ from mocoflow_core.io.pictures import as_bytes, read_picture, write_picture
 from mocoflow_core.methods.posed_mesh import ColouredMesh
 from mocoflow_core.metrics.score import EvaluationConfig
 from mocoflow_core.metrics.views import spread_frames
+from mocoflow_core.progress import Progress
 from mocoflow_core.rendering.posed_scene import PosedScene
 from mocoflow_core.rendering.trained_scene import TrainedScene
 
 Image = NDArray[np.float32]
-Progress = Callable[[float, str], None]
 
 
 class ScoredView(NamedTuple):

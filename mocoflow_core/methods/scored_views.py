@@ -7,12 +7,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from mocoflow_core.methods.rendered_views import Image, Progress, Renderer, ScoredView
+from mocoflow_core.methods.rendered_views import Image, Renderer, ScoredView
 from mocoflow_core.metrics.crop import crop_around, crop_side
 from mocoflow_core.metrics.curve import CurveRow
 from mocoflow_core.metrics.score import EvaluationConfig, protocol, score_view
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.views import draw_views
+from mocoflow_core.progress import Progress
 
 
 class Subject(NamedTuple):

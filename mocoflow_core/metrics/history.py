@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
@@ -77,19 +78,21 @@ class Regression(NamedTuple):
     """A number that is worse than usual by more than its margin; nan where there is none now."""
 
     contender: Contender
-    measure: str  # empty where the contender has no number at all
+    measure: str
     value: float
     usual: float
     nights: int  # that the usual value is the median of
 
 
-def regressions(now: Sequence[HistoryRow], past: Iterable[HistoryRow]) -> list[Regression]:
+def regressions(now: Iterable[HistoryRow], past: Iterable[HistoryRow]) -> list[Regression]:
     """What is worse, slower or missing, against the median of the last nights.
 
-    Seconds are compared with nights on the same machine alone.
+    Seconds are compared with nights on the same machine alone, and are never missing: what an
+    earlier command has trained has none.
     """
-    past = list(past)
-    found = [r for row in now if (r := _worse(row, _before(row, past)))]
+    past = [row for row in past if not math.isnan(row.value)]
+    now = [row for row in now if not math.isnan(row.value)]
+    found = [worse for row in now if (worse := _worse(row, _before(row, past)))]
     return found + _missing(now, past)
 
 
@@ -114,19 +117,19 @@ def _worse(row: HistoryRow, before: Sequence[float]) -> Regression | None:
     return Regression(row.contender, row.measure, row.value, usual, len(before))
 
 
-def _missing(now: Iterable[HistoryRow], past: Iterable[HistoryRow]) -> list[Regression]:
-    """Contenders of the last nights that have no number now."""
-    nights: dict[Contender, set[str]] = {}
+def _missing(now: Iterable[HistoryRow], past: Sequence[HistoryRow]) -> list[Regression]:
+    """Numbers of the last nights that there are none of now."""
+    here = {(row.contender, row.measure) for row in now}
+    last = set(sorted({row.night for row in past})[-LAST_NIGHTS:])
+    gone: dict[tuple[Contender, str], list[float]] = {}
     for row in past:
-        nights.setdefault(row.contender, set()).add(row.night)
-    last = sorted(set().union(*nights.values()))[-LAST_NIGHTS:] if nights else []
-    here = {row.contender for row in now}
-    counts = {c: len(seen.intersection(last)) for c, seen in nights.items() if c not in here}
-    nan = float("nan")
+        number = (row.contender, row.measure)
+        if row.night in last and row.measure not in SECONDS and number not in here:
+            gone.setdefault(number, []).append(row.value)
     return [
-        Regression(contender, "", nan, nan, count)
-        for contender, count in counts.items()
-        if count >= FEWEST_NIGHTS
+        Regression(*number, math.nan, median(values), len(values))
+        for number, values in gone.items()
+        if len(values) >= FEWEST_NIGHTS
     ]
 
 

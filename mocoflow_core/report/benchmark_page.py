@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from mocoflow_core.io.machine import described
 from mocoflow_core.methods.ablations import change_of
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.methods.person_scores import PHOTOGRAPHS
@@ -123,8 +124,5 @@ def _protocols(scores: Runs[ScoreRow]) -> list[str]:
 
 def _machines(cells: Sequence[CellRecord]) -> list[str]:
     """Each machine once, in words."""
-    described = (
-        ", ".join(f"{name} {cell.machine[name]}" for name in MACHINE if name in cell.machine)
-        for cell in cells
-    )
-    return list(dict.fromkeys(filter(None, described)))
+    each = (described(cell.machine, MACHINE) for cell in cells)
+    return list(dict.fromkeys(filter(None, each)))

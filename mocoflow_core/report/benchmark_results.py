@@ -29,6 +29,7 @@ class BenchmarkResults:
     curves: Runs[CurveRow]
     times: Sequence[TimeToTarget]
     misplaced: Sequence[MisalignmentRow] = ()
+    unread: Sequence[Omission] = ()  # what could not be begun
     past: Sequence[HistoryRow] = ()  # earlier nights
     experiment: Experiment = USUAL
 
@@ -39,7 +40,7 @@ class BenchmarkResults:
 
     def omissions(self) -> list[Omission]:
         """What is missing, or compares nothing."""
-        return omissions(self.cells, self.scores, self.times)
+        return [*self.unread, *omissions(self.cells, self.scores, self.times)]
 
     def tonight(self) -> list[HistoryRow]:
         """This night's numbers, as later ones will read them."""

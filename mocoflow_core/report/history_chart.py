@@ -25,10 +25,10 @@ def plot_history(
 
     Nights stand in their order, this one last; what is flagged has a ring.
     """
-    if not past:
+    if not any(row.measure in MEASURES for row in past):
         return None
-    rows = [*past, *now]
-    contenders = list(dict.fromkeys(row.contender for row in (*now, *past)))
+    rows = [row for row in (*now, *past) if row.measure in MEASURES]
+    contenders = list(dict.fromkeys(row.contender for row in rows))
     scenes = list(dict.fromkeys(contender.scene for contender in contenders))
     nights = [*sorted({row.night for row in past}), NOW]
     rings = {(found.contender, found.measure) for found in flagged}

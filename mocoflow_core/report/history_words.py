@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mocoflow_core.metrics.history import FEWEST_NIGHTS, LAST_NIGHTS, MARGINS, Regression
 from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.omissions import Omission
@@ -10,9 +12,10 @@ from mocoflow_core.report.omissions import Omission
 def in_words(found: Regression) -> Omission:
     """What is worse, and by how much."""
     name = "/".join(found.contender)
-    if not found.measure:
-        return Omission(name, f"no number at all, which {found.nights} of the last nights had")
     label = label_of(found.measure)
+    if math.isnan(found.value):
+        usual = f"{label.with_unit(found.usual)} in the median of the last {found.nights} nights"
+        return Omission(f"{name}: {label.title}", f"no number, which was {usual}")
     loss = label.with_unit(abs(found.value - found.usual))
     margin = label.with_unit(MARGINS[found.measure].at(found.usual))
     return Omission(

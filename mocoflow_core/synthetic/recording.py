@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.progress import Progress
 from mocoflow_core.synthetic.background import render_background
 from mocoflow_core.synthetic.camera_ring import camera_ring
 from mocoflow_core.synthetic.configuration import RecordingConfig
@@ -17,8 +17,6 @@ from mocoflow_core.synthetic.renderer import FrameRenderer
 from mocoflow_core.synthetic.scene_files import SceneFiles
 from mocoflow_core.synthetic.surface import Surface
 from mocoflow_core.synthetic.texture import encode_srgb
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, eq=False)

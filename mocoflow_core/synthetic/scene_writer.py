@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from mocoflow_core.progress import Progress
 from mocoflow_core.synthetic.clothing import Outfit
 from mocoflow_core.synthetic.configuration import SyntheticConfig
 from mocoflow_core.synthetic.mesh_estimate import estimate_meshes
 from mocoflow_core.synthetic.motions import MOTIONS, Motion
 from mocoflow_core.synthetic.person import Person
-from mocoflow_core.synthetic.recording import Performance, Progress, record_scene
+from mocoflow_core.synthetic.recording import Performance, record_scene
 from mocoflow_core.synthetic.scene_files import SceneFiles
 from mocoflow_core.synthetic.surface import Surface
 from mocoflow_core.synthetic.topology import Topology, body_topology

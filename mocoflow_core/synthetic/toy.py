@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
 from mocoflow_core.body.mesh_sequence import MeshSequence
+from mocoflow_core.progress import Progress
 from mocoflow_core.synthetic.configuration import RecordingConfig
-from mocoflow_core.synthetic.recording import Performance, Progress, record_scene
+from mocoflow_core.synthetic.recording import Performance, record_scene
 from mocoflow_core.synthetic.scene_files import SceneFiles
 from mocoflow_core.synthetic.surface import Surface
 from mocoflow_core.synthetic.texture import Array, checker, linear, stripes

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -24,6 +23,7 @@ from mocoflow_core.fields.network_field import (
 )
 from mocoflow_core.fields.network_shape import NetworkShape
 from mocoflow_core.losses.weights import LossConfig
+from mocoflow_core.progress import Progress
 from mocoflow_core.rendering.box_scene import BoxScene
 from mocoflow_core.rendering.box_space import BoxSpace
 from mocoflow_core.rendering.frame_box import BoxConfig, Follows, frame_boxes
@@ -42,8 +42,6 @@ from mocoflow_core.training.schedule import ScheduleConfig
 _WEIGHTS = "model.safetensors"
 _RESULT = "stage.json"  # of a stage that was trained
 _MOST_EMPTY = 0.5  # of the mesh's vertices, which lie on the surface itself
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +14,9 @@ from mocoflow_core.perception.blazepose import PRESENT, BlazePose
 from mocoflow_core.perception.blazepose_detector import REGION_MARGIN, Detection
 from mocoflow_core.perception.blazepose_landmarks import Pose
 from mocoflow_core.perception.region import Region
+from mocoflow_core.progress import Progress
 from mocoflow_core.video.tracks import Track, choose_track, find_tracks, nobody
 
-Progress = Callable[[float, str], None]
 BATCH = 8
 # A person that is missed for no longer is still there.
 LONGEST_GAP_S = 0.35

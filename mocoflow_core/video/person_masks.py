@@ -14,7 +14,8 @@ from mocoflow_core.capture.background import background_plate
 from mocoflow_core.capture.frame_source import FrameSource, Image
 from mocoflow_core.perception.blazepose_landmarks import Pose
 from mocoflow_core.perception.person import PersonSegmenter
-from mocoflow_core.video.followed_person import FollowedPerson, Progress
+from mocoflow_core.progress import Progress
+from mocoflow_core.video.followed_person import FollowedPerson
 
 Mask = NDArray[np.bool_]  # (H, W)
 Probability = NDArray[np.float32]  # (H, W)

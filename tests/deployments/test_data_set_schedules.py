@@ -11,7 +11,7 @@ from flows.production.deploy import _set_schedules
 ASKED = {
     "name": "aist",
     "entrypoint": "ours",
-    "schedules": [{"cron": "0 1 * * 6", "timezone": "Etc/UTC", "active": False}],
+    "schedules": [{"slug": "nights", "cron": "0 1 * * 6", "timezone": "Etc/UTC", "active": False}],
 }
 
 
@@ -20,17 +20,22 @@ class Client:
 
     def __init__(self):
         self.active = None
+        self.deleted = []
 
     def read_deployments(self):
-        schedule = SimpleNamespace(id="schedule")
+        schedule = SimpleNamespace(id="schedule", slug="nights")
+        former = SimpleNamespace(id="former", slug="weekly")
         theirs = SimpleNamespace(name="aist", entrypoint="theirs", schedules=[])
         ours = SimpleNamespace(
-            name="aist", entrypoint="ours", id="aist", flow_id="flow", schedules=[schedule]
+            name="aist", entrypoint="ours", id="aist", flow_id="flow", schedules=[former, schedule]
         )
         return [theirs, ours]
 
     def read_flow(self, _):
         return SimpleNamespace(name="benchmark")
+
+    def delete_deployment_schedule(self, *ids):
+        self.deleted.append(ids)
 
     def update_deployment_schedule(self, *_, active):
         self.active = active
@@ -55,3 +60,4 @@ def test_a_schedule_is_active_where_its_data_are_and_says_what_it_waits_for(
     [said] = _set_schedules(client, ASKED)
     assert state in said
     assert client.active == (state == "runs")
+    assert client.deleted == [("aist", "former")]

@@ -64,6 +64,7 @@ def test_one_cell_of_a_deployed_benchmark_is_cancelled_and_the_other_finishes(
         settings=["schedule.rays=63"],
         out=str(out),
         store=str(tmp_path / "store"),
+        afresh=False,
     )
     name, end = "toy/toy/mocoflow/0", time.monotonic() + 180.0
     while deployed.runs().get(name, {"state_type": ""})["state_type"] != "RUNNING":

@@ -17,7 +17,7 @@ from prefect.exceptions import Abort
 from prefect.states import Cancelling
 from pyarrow import parquet
 
-from flows import regression_event
+from flows import benchmark_scenes, regression_event
 from flows.benchmark import NothingFinished
 from flows.benchmark_request import BenchmarkRequest
 from flows.command_line import main
@@ -286,6 +286,28 @@ def test_what_no_cell_could_run_with_is_refused_before_any(changes, because, tmp
     with pytest.raises(InputError, match=because):
         request.claim()
     assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_that_cannot_be_made_is_the_end_of_its_own_cells_alone(tmp_path, monkeypatch):
+    def make(name: str) -> Path:
+        if name == "walk":
+            raise PermissionError("no room")
+        return tmp_path / name
+
+    monkeypatch.setattr(benchmark_scenes, "demo_scene", make)
+    request = BenchmarkRequest(scenes=("walk", "turn"), out=tmp_path / "out", seeds=1)
+    made = {cell.record.scene: cell.record for cell in request.cells()}
+    assert (made["walk"].state, made["turn"].state) == ("refused", "failed")
+    assert made["walk"].reason == "PermissionError: no room"
+
+
+def test_a_folder_is_the_same_question_from_everywhere(tmp_path, monkeypatch, toy_scene):
+    def question(scene: str) -> str:
+        return BenchmarkRequest(scenes=(scene,), out=tmp_path / "out").question
+
+    whole = question(f"{toy_scene}@cam01")
+    monkeypatch.chdir(toy_scene.parent)
+    assert question(f"./{toy_scene.name}@cam01") == question(f"{toy_scene.name}@cam01") == whole
 
 
 def test_the_command_line_refuses_likewise_and_takes_several_values(monkeypatch, capsys, tmp_path):

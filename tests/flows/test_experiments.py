@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
+from flows import misplaced_scenes
 from flows.benchmark_request import BenchmarkRequest
 from flows.benchmark_scenes import read_scenes
 from mocoflow_core.errors import InputError
@@ -19,6 +20,7 @@ from mocoflow_core.metrics.misalignment import MISPLACEMENTS, read_misalignment
 from mocoflow_core.metrics.table import read_scores
 from mocoflow_core.presets import fast
 from mocoflow_core.settings import with_settings
+from tasks.cancellation import RunCancelled
 from tests.flows.test_paper import TINY
 
 
@@ -83,12 +85,23 @@ def test_a_scene_that_cannot_be_read_is_named_and_the_others_are_misplaced(
     frame.symlink_to("nowhere")
     scenes = (str(tmp_path / "torn"), str(toy_scene))
     record = compare(tmp_path / "out", experiment="misalignment", scenes=scenes)
-    [unread] = record.cells
-    assert (unread.scene, unread.state) == ("torn", "failed")
-    assert frame.name in unread.reason
+    [unread] = record.omissions
+    assert unread["what"] == "torn, misplaced views"
+    assert frame.name in unread["why"]
     assert "torn" in (tmp_path / "out/table.md").read_text()
+    assert "torn, misplaced views" in (tmp_path / "out/benchmark.html").read_text()
     rows = read_misalignment(tmp_path / "out/misalignment.parquet")
     assert {row.scene for row in rows} == {"toy"}
+
+
+def test_cancelling_ends_all_of_it(tmp_path, monkeypatch, toy_scene):
+    def cancel(*_):
+        raise RunCancelled("cancelled")
+
+    monkeypatch.setattr(misplaced_scenes, "misplace_views", cancel)
+    asked = {"experiment": "misalignment", "scenes": (str(toy_scene),), "out": tmp_path / "out"}
+    with pytest.raises(RunCancelled):
+        misplaced_scenes.misplaced_scenes(BenchmarkRequest(**asked))
 
 
 def test_misplaced_views_need_no_run(compare, tmp_path):
@@ -159,7 +172,7 @@ def test_the_command_of_an_experiment_asks_for_the_same_again(tmp_path):
     assert asked.command == (
         "mocoflow benchmark --experiment partial_observation --scenes turn turn_noise6 "
         "--methods mocoflow partial_observation posed_mesh --presets fast --seeds 3 "
-        f"--out {tmp_path}/out --set evaluation.least_shown=0.5"
+        f"--set evaluation.least_shown=0.5 --out {tmp_path}/out"
     )
     again = BenchmarkRequest(
         experiment=asked.experiment, out=asked.out, settings=("evaluation.least_shown=0.5",)

@@ -29,6 +29,7 @@ def request(out, **changes) -> BenchmarkRequest:
         ({"workers": 0}, "--workers must be 1 to"),
         ({"workers": CORES + 1}, f"--workers must be 1 to {CORES}"),
         ({"workers": 2, "dask": "tcp://127.0.0.1:1"}, "here or on a --dask cluster"),
+        ({"dask": "tcp://127.0.0.1"}, "an address with its port"),
     ],
 )
 def test_what_cannot_work_is_refused_before_any_cell(changes, because, tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from mocoflow_core.methods.benchmark_folder import BenchmarkFolder, BenchmarkRecord, CellRecord
@@ -68,6 +70,24 @@ def test_a_benchmark_that_is_asked_for_again_keeps_its_place_among_the_nights(fi
     rows = past_nights(again.path, again.begun)
     assert {row.night[:10] for row in rows} == {"2026-01-01"}
     assert again.finish({}).finished_at == "2026-01-02T01:00:00+00:00"
+
+
+def test_one_of_which_nothing_finished_is_no_night_and_its_retry_is_one_of_its_own(
+    finish, tmp_path
+):
+    empty = BenchmarkFolder.claim(tmp_path / "now", begun())
+    assert empty.finish({}).finished_at == ""
+    finish("meanwhile", "2026-01-01T01:00:00+00:00")
+    again = BenchmarkFolder.claim(tmp_path / "now", begun())
+    assert past_nights(again.path, again.begun)
+    assert again.finish({"cells": (cell(0),)}).finished_at > "2026-01-01"
+
+
+def test_the_folder_may_be_the_working_directory(finish, tmp_path, monkeypatch):
+    finish("first", "2026-01-01T01:00:00+00:00")
+    (tmp_path / "now").mkdir()
+    monkeypatch.chdir(tmp_path / "now")
+    assert past_nights(Path(), begun())
 
 
 def test_records_that_do_not_know_what_was_asked_are_no_past(finish, tmp_path):

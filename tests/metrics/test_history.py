@@ -70,12 +70,17 @@ def test_seconds_of_another_machine_are_no_measure():
     assert flagged("cpu_s", 99.0, past, machine="a fast one")
 
 
-def test_a_contender_without_any_number_is_flagged():
-    past = nights("psnr_union", 21.0, 21.0, 21.0)
-    other = row(NOW, "psnr_union", 21.0, who=Contender("walk", "fast", "mocoflow"))
-    [found] = regressions([other], past)
-    assert (found.contender, found.measure, found.nights) == (OURS, "", 3)
+@pytest.mark.parametrize(
+    "now", [[], [row(NOW, "oks", math.nan)], [row(NOW, "ssim", 0.9)]], ids=["none", "nan", "other"]
+)
+def test_a_score_that_there_is_none_of_now_is_flagged(now):
+    [found] = regressions(now, nights("oks", 0.9, 0.9, 0.8))
+    assert (found.contender, found.measure, found.usual, found.nights) == (OURS, "oks", 0.9, 3)
     assert math.isnan(found.value)
+
+
+def test_seconds_that_nobody_measured_now_are_not_missing():
+    assert not regressions([row(NOW, "ssim", 0.9)], nights("cpu_s", 30.0, 30.0, 30.0))
 
 
 def test_one_that_went_long_ago_is_no_news():
@@ -85,5 +90,7 @@ def test_one_that_went_long_ago_is_no_news():
     assert not regressions([row(NOW, "psnr_union", 21.0, who=other)], [*gone, *since])
 
 
-def test_numbers_that_are_none_flag_nothing():
-    assert not flagged("keypoint_mm", math.nan, nights("keypoint_mm", 20.0, 20.0, 20.0))
+def test_nights_without_a_number_do_not_count():
+    past = nights("keypoint_mm", 20.0, math.nan, math.nan, 20.0)
+    assert not flagged("keypoint_mm", 90.0, past)
+    assert flagged("keypoint_mm", 90.0, [*past, *nights("keypoint_mm", 20.0)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,11 +22,11 @@ from mocoflow_core.body.mesh_sequence import MeshSequence
 from mocoflow_core.configuration import ConfigurationPart
 from mocoflow_core.errors import InputError
 from mocoflow_core.geometry.camera import Camera
+from mocoflow_core.progress import Progress
 
 Array = NDArray[np.float64]
 _MESH_ARRAYS = ("frame_indices", "vertices", "faces", "keypoint_regressor")
 _UNKNOWNS = ("places", "rotations", "angles", "shape", "clothes")
-Progress = Callable[[float, str], None]
 
 _COCO = 17
 # At first landmarks count as if they erred so many times as much.
