@@ -11,7 +11,6 @@ from mocoflow_core.io.content_key import digest_document
 from mocoflow_core.io.full_disk import full_disk_is_bad_input
 from mocoflow_core.synthetic.catalogue import SCENES, named_scene
 from mocoflow_core.synthetic.configuration import SyntheticConfig
-from mocoflow_core.synthetic.scene_writer import write_scene
 from tasks.terminal_bar import terminal_bar
 
 # What is reconstructed where no scene is named.
@@ -39,6 +38,9 @@ def named_demo(path: Path) -> Path | None:
 
 
 def _make(configuration: SyntheticConfig, folder: Path) -> None:
+    # The body model's package takes seconds to import, which most runs do without.
+    from mocoflow_core.synthetic.scene_writer import write_scene
+
     folder.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(mkdtemp(prefix=f"{configuration.name}-", dir=folder.parent))
     try:

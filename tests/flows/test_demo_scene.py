@@ -7,9 +7,9 @@ import os
 
 import pytest
 
-import flows.demo_scene
 from flows.demo_scene import demo_scene
 from mocoflow_core.errors import InputError
+from mocoflow_core.synthetic import scene_writer
 
 
 def test_a_full_disk_is_bad_input_and_leaves_no_folder_behind(monkeypatch, tmp_path):
@@ -18,7 +18,7 @@ def test_a_full_disk_is_bad_input_and_leaves_no_folder_behind(monkeypatch, tmp_p
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(flows.demo_scene, "write_scene", full)
+    monkeypatch.setattr(scene_writer, "write_scene", full)
     with pytest.raises(InputError, match="full disk"):
         demo_scene("turn")
     assert not list((tmp_path / "mocoflow" / "scenes").iterdir())

@@ -84,7 +84,8 @@ def test_a_scene_that_cannot_be_read_is_named_and_the_others_are_misplaced(
     frame.unlink()
     frame.symlink_to("nowhere")
     scenes = (str(tmp_path / "torn"), str(toy_scene))
-    record = compare(tmp_path / "out", experiment="misalignment", scenes=scenes)
+    quick = ("person_scores.use=off",)
+    record = compare(tmp_path / "out", experiment="misalignment", scenes=scenes, settings=quick)
     [unread] = record.omissions
     assert unread["what"] == "torn, misplaced views"
     assert frame.name in unread["why"]
@@ -105,7 +106,8 @@ def test_cancelling_ends_all_of_it(tmp_path, monkeypatch, toy_scene):
 
 
 def test_misplaced_views_need_no_run(compare, tmp_path):
-    record = compare(tmp_path / "out", experiment="misalignment")
+    settings = ("evaluation.frames_per_camera=1",)
+    record = compare(tmp_path / "out", experiment="misalignment", settings=settings)
     assert record.cells == ()
     rows = read_misalignment(tmp_path / "out/misalignment.parquet")
     # No keypoints are found in a figure of capsules: no pair, no OKS.
