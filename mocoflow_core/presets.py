@@ -68,13 +68,15 @@ def fast() -> Configuration:
 
 def toy() -> Configuration:
     """A few steps on coarse grids, for tests."""
+    coarse = BodyMotionConfig(node_spacing_m=0.1, control_spacing_m=0.08)
     return Configuration(
         density=DensityConfig(spacing_m=0.03),
-        motion=MotionConfig(body=BodyMotionConfig(node_spacing_m=0.1, control_spacing_m=0.08)),
+        motion=MotionConfig(body=coarse),
         canonical=CanonicalConfig(finest_m=0.04, levels=2),
         sampling=SamplingConfig(step_m=0.03),
         schedule=ScheduleConfig(coarse_steps=10, fine_steps=10, rays=64, threads=1),
         person_scores=PersonScoreConfig(use="off"),
+        truth=TruthConfig(frames=4, spreading=coarse),
         presentation=PresentationConfig(turntable_views=4),
     )
 
