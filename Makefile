@@ -38,7 +38,7 @@ e2e: install
 cluster: install
 	$(BIN)/python -m pytest -m cluster
 
-# What is lost when something dies or breaks: docs/reliability.md. A quarter of an hour of CPU.
+# What is lost when something dies or breaks: docs/reliability.md. Some twenty minutes.
 faults: install
 	$(BIN)/python -m pytest -m faults
 

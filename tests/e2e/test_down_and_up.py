@@ -12,7 +12,7 @@ from flows.production.site import AUTHENTICATION
 from flows.production.up import RUNS_AT_ONCE
 from tests.e2e.production import available_database, production, site_command
 
-pytestmark = pytest.mark.e2e
+pytestmark = pytest.mark.faults
 
 
 @pytest.fixture(scope="module", params=[available_database()], ids=str)
