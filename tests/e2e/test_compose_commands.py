@@ -22,7 +22,7 @@ import s3fs
 import yaml
 
 from flows.production.api import admits, answers, ask, wait_for
-from flows.production.postgresql import PostgreSQL
+from flows.production.postgresql import PostgreSQL, find_programs
 from flows.production.processes import heed_interrupts
 from flows.production.site import AUTHENTICATION, Database, Site
 from tests.e2e.production import ROOT, available_database
@@ -143,6 +143,19 @@ def running(here, service):
 def server(here):
     with running(here, "server"):
         yield here
+
+
+def test_the_database_is_healthy_where_it_answers_and_only_there(here):
+    kind, line = SERVICES["database"]["healthcheck"]["test"]
+    assert kind == "CMD-SHELL"
+    path = f"{find_programs()}{os.pathsep}{os.environ['PATH']}"
+
+    def is_healthy(port: str) -> bool:
+        asked = {"PATH": path, "PGPORT": port}
+        return subprocess.run(line, shell=True, env=asked, capture_output=True).returncode == 0
+
+    assert is_healthy(here.places["PREFECT_SERVER_DATABASE_PORT"])
+    assert not is_healthy(str(free_port()))
 
 
 def test_the_server_answers_nobody_without_the_password(server, monkeypatch):
