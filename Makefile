@@ -34,7 +34,7 @@ test: install
 e2e: install
 	$(BIN)/python -m pytest -m e2e
 
-# Benchmarks in several processes and on a Dask cluster, and who can reach them. Some minutes.
+# Benchmarks in several processes and on a Dask cluster, who can reach them, who is told. Some minutes.
 cluster: install
 	$(BIN)/python -m pytest -m cluster
 

@@ -8,11 +8,11 @@ from mocoflow_core.synthetic.toy import write_toy_scene
 from tests.e2e.production import available_database, production
 
 
-@pytest.fixture(scope="session", params=[available_database()], ids=str)
-def deployed(request, tmp_path_factory):
-    """Its tests have the database in their names: SQLite only where there is no PostgreSQL."""
-    files = tmp_path_factory.getbasetemp()
-    with production(tmp_path_factory.mktemp("production"), files, request.param) as made:
+@pytest.fixture(scope="session")
+def deployed(tmp_path_factory):
+    """On SQLite only where there is no PostgreSQL."""
+    files, database = tmp_path_factory.getbasetemp(), available_database()
+    with production(tmp_path_factory.mktemp("production"), files, database) as made:
         yield made
 
 

@@ -17,7 +17,7 @@ from mocoflow_core.metrics.history import FEWEST_NIGHTS
 from tests.e2e.production import ROOT
 from tests.e2e.test_deployed_runs import ENDED
 
-pytestmark = pytest.mark.e2e
+pytestmark = pytest.mark.cluster
 
 BLOCK = """
 import sys

@@ -19,7 +19,7 @@ from PIL import Image
 from flows.production.api import ask
 from flows.production.postgresql import PostgreSQL
 from flows.production.site import Database, Site
-from tests.e2e.production import ROOT, UNNEEDED, new, site_command
+from tests.e2e.production import ROOT, UNNEEDED, available_database, new, site_command
 
 pytestmark = pytest.mark.e2e
 
@@ -48,6 +48,13 @@ def first_run(deployed, scene, tmp_path_factory):
     """A run of mocoflow/fast: its id and what it has left."""
     out = tmp_path_factory.mktemp("runs") / "first"
     return run_fast(deployed, scene, out), out
+
+
+@pytest.mark.skipif(
+    available_database() != Database.POSTGRESQL, reason="PostgreSQL is not installed: on SQLite"
+)
+def test_the_site_is_on_postgresql_as_in_production(deployed):
+    assert deployed.site.database == Database.POSTGRESQL
 
 
 def test_a_deployed_run_completes_and_shows_what_it_found(deployed, first_run):
