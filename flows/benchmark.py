@@ -23,7 +23,7 @@ from flows.regression_event import tell_of_regressions
 from flows.results_folders import folder_of_this_run
 from flows.run_cells import run_cells
 from flows.run_facts import show_benchmark_in_prefect
-from mocoflow_core.methods.benchmark_folder import BenchmarkRecord
+from mocoflow_core.methods.benchmark_folder import RECORD, BenchmarkRecord
 from mocoflow_core.methods.past_benchmarks import past_nights
 from mocoflow_core.presets import Preset
 from tasks.collect_cells import collect_cells
@@ -118,10 +118,12 @@ def benchmark(
     tables = collect_cells(
         where, files, records, list(request.methods), request.waited_for, misplaced
     )
-    past = [row._asdict() for row in past_nights(folder.path, folder.begun)]
+    nights = past_nights(folder.path, folder.begun)
+    around = folder.path.resolve().parent
     page = write_benchmark(
         *(where, tables, records, request.command, request.experiment),
-        *(past, [omission._asdict() for omission in unread]),
+        *([omission._asdict() for omission in unread], nights),
+        folder_source(around, [f"{night}/{RECORD}" for night in nights]),
     )
 
     for name in COLLECTED:

@@ -7,17 +7,20 @@ from pydantic import JsonValue
 from mocoflow_core.artifacts import BenchmarkArtifact, CellTablesArtifact
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.methods.experiments import EXPERIMENTS, USUAL
+from mocoflow_core.methods.past_benchmarks import read_nights
 from mocoflow_core.metrics.benchmark_tables import read_runs
 from mocoflow_core.metrics.curve import CurveRow
-from mocoflow_core.metrics.history import HistoryRow, write_history
+from mocoflow_core.metrics.history import write_history
 from mocoflow_core.metrics.misalignment import read_misalignment
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import read_times
 from mocoflow_core.report.benchmark_chart import write_benchmark_chart
 from mocoflow_core.report.benchmark_page import write_benchmark_page
 from mocoflow_core.report.benchmark_results import BenchmarkResults
+from mocoflow_core.report.history_words import in_words
 from mocoflow_core.report.markdown_tables import write_markdown_tables
 from mocoflow_core.report.omissions import Omission
+from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
 ALGORITHM_VERSION = 5  # The nights before.
@@ -30,13 +33,14 @@ def write_benchmark(
     cells: list[dict[str, JsonValue]],
     command: str,
     experiment: str | None,
-    past: list[dict[str, JsonValue]],
     unread: list[dict[str, str]],
+    nights: list[str],
+    past: Source,
 ) -> Summary:
     """Error against run time with median and range, scores, time to target, omissions, machine.
 
-    And how this night compares with those before: ``past``, as rows of the history. ``unread`` are
-    omissions that no cell tells of.
+    And how this night compares with those before: folders of ``nights`` in ``past``. ``unread``
+    are omissions that no cell tells of.
 
     Output: ``benchmark.html``, ``table.md``, ``history.parquet``, and ``error_against_time.png``
     where a cell finished. Seconds.
@@ -50,7 +54,7 @@ def write_benchmark(
         misplaced=read_misalignment(held / "misalignment.parquet"),
         experiment=USUAL if experiment is None else EXPERIMENTS[experiment],
         unread=[Omission(**omission) for omission in unread],
-        past=[HistoryRow(**row) for row in past],  # type: ignore[arg-type]
+        past=read_nights(past.path, nights),
     )
     write_benchmark_chart(results.curves, work.folder / "error_against_time.png")
     write_benchmark_page(results, command, work.folder / "benchmark.html")
@@ -59,5 +63,5 @@ def write_benchmark(
     return {
         "summary": results.summary_records(),
         "omissions": [omission._asdict() for omission in results.omissions()],
-        "regressions": [worse._asdict() for worse in results.regressions()],
+        "regressions": [worse._asdict() for worse in in_words(results.regressions())],
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from prefect.client.orchestration import SyncPrefectClient
@@ -54,11 +55,11 @@ def _named(client: SyncPrefectClient, name: str) -> list[str]:
 
 def _block_id(client: SyncPrefectClient, name: str) -> str:
     kind, _, own = name.partition("/")
-    try:
-        return str(client.read_block_document_by_name(own, kind).id)
-    except ObjectNotFound as error:
-        raise InputError(
-            f"{BLOCK} must be a block of the server, as slack-webhook/ops",
-            repr(name),
-            "Make it on the page Blocks, then deploy again.",
-        ) from error
+    with suppress(ObjectNotFound):
+        if own:
+            return str(client.read_block_document_by_name(own, kind).id)
+    raise InputError(
+        f"{BLOCK} must be a block of the server, as slack-webhook/ops",
+        repr(name),
+        "Make it on the page Blocks, then deploy again.",
+    )

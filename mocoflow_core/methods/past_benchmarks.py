@@ -23,27 +23,28 @@ SHOWN_NIGHTS = 60
 DECIDES_SPEED = ("model", "cores", "threads", "devices")
 
 
-def past_nights(own: Path, begun: BenchmarkRecord) -> list[HistoryRow]:
-    """The numbers of finished benchmarks that asked the same, in the folders beside ``own``.
+def past_nights(own: Path, begun: BenchmarkRecord) -> list[str]:
+    """Names of the folders beside ``own`` with finished benchmarks that asked the same, in order.
 
     Those that were finished later than ``begun`` once was, where it was, are left out: what a
     night is compared with does not change afterwards.
     """
     own = own.resolve()
     before = begun.finished_at or "~"  # Behind every moment.
-    found = [
-        record
-        for file in own.parent.glob(f"*/{RECORD}")
-        if file.parent != own and (record := read_benchmark(file.parent)) is not None
-    ]
-    nights = sorted(
-        (r for r in found if r.finished and r.finished_at and r.question == begun.question != ""),
-        key=lambda record: record.finished_at,
-    )
-    earlier = [record for record in nights if record.finished_at < before]
+    found = []
+    for folder in (file.parent for file in own.parent.glob(f"*/{RECORD}") if file.parent != own):
+        record = read_benchmark(folder)
+        if record and record.finished and record.question == begun.question != "":
+            found.append((record.finished_at, folder.name))
+    return [name for moment, name in sorted(found) if "" < moment < before][-SHOWN_NIGHTS:]
+
+
+def read_nights(folder: Path, names: Iterable[str]) -> list[HistoryRow]:
+    """The numbers of benchmarks in a folder, by the names of theirs."""
+    records = filter(None, (read_benchmark(folder / name) for name in names))
     return [
         row
-        for record in earlier[-SHOWN_NIGHTS:]
+        for record in records
         for row in night_rows(record.finished_at, record.cells, record.summary)
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -45,6 +45,9 @@ class HistoryRow(NamedTuple):
     @property
     def contender(self) -> Contender:
         return Contender(self.scene, self.preset, self.method)
+
+
+Number = tuple[Contender, str]  # of a contender, by its measure
 
 
 class Margin(NamedTuple):
@@ -90,47 +93,41 @@ def regressions(now: Iterable[HistoryRow], past: Iterable[HistoryRow]) -> list[R
     Seconds are compared with nights on the same machine alone, and are never missing: what an
     earlier command has trained has none.
     """
-    past = [row for row in past if not math.isnan(row.value)]
-    now = [row for row in now if not math.isnan(row.value)]
-    found = [worse for row in now if (worse := _worse(row, _before(row, past)))]
-    return found + _missing(now, past)
+    before: dict[Number, list[HistoryRow]] = {}
+    for row in sorted(row for row in past if not math.isnan(row.value)):
+        before.setdefault((row.contender, row.measure), []).append(row)
+    here = {(row.contender, row.measure): row for row in now if not math.isnan(row.value)}
+    found = [_worse(row, before.get(number, [])) for number, row in here.items()]
+    return [*filter(None, found), *_missing(here, before)]
 
 
-def _before(row: HistoryRow, past: Iterable[HistoryRow]) -> list[float]:
-    """The same number in the last nights."""
-    same = [
-        other
-        for other in past
-        if (other.contender, other.measure) == (row.contender, row.measure)
-        and (row.measure not in SECONDS or other.machine == row.machine)
-    ]
-    return [other.value for other in sorted(same)[-LAST_NIGHTS:]]
-
-
-def _worse(row: HistoryRow, before: Sequence[float]) -> Regression | None:
-    if len(before) < FEWEST_NIGHTS:
+def _worse(row: HistoryRow, before: Sequence[HistoryRow]) -> Regression | None:
+    """``before``: the same number in every night, the last one at the end."""
+    values = [
+        other.value
+        for other in before
+        if row.measure not in SECONDS or other.machine == row.machine
+    ][-LAST_NIGHTS:]
+    if len(values) < FEWEST_NIGHTS:
         return None
-    usual = median(before)
+    usual = median(values)
     is_worse = as_error(row.measure, row.value) > as_error(row.measure, usual)
     if not is_worse or abs(row.value - usual) <= MARGINS[row.measure].at(usual):
         return None
-    return Regression(row.contender, row.measure, row.value, usual, len(before))
+    return Regression(row.contender, row.measure, row.value, usual, len(values))
 
 
-def _missing(now: Iterable[HistoryRow], past: Sequence[HistoryRow]) -> list[Regression]:
+def _missing(
+    here: Container[Number], before: Mapping[Number, Sequence[HistoryRow]]
+) -> Iterator[Regression]:
     """Numbers of the last nights that there are none of now."""
-    here = {(row.contender, row.measure) for row in now}
-    last = set(sorted({row.night for row in past})[-LAST_NIGHTS:])
-    gone: dict[tuple[Contender, str], list[float]] = {}
-    for row in past:
-        number = (row.contender, row.measure)
-        if row.night in last and row.measure not in SECONDS and number not in here:
-            gone.setdefault(number, []).append(row.value)
-    return [
-        Regression(*number, math.nan, median(values), len(values))
-        for number, values in gone.items()
-        if len(values) >= FEWEST_NIGHTS
-    ]
+    nights = sorted({row.night for rows in before.values() for row in rows})
+    last = set(nights[-LAST_NIGHTS:])
+    for (contender, measure), rows in before.items():
+        values = [row.value for row in rows if row.night in last]
+        if measure in SECONDS or (contender, measure) in here or len(values) < FEWEST_NIGHTS:
+            continue
+        yield Regression(contender, measure, math.nan, median(values), len(values))
 
 
 def write_history(rows: Iterable[HistoryRow], path: Path) -> None:

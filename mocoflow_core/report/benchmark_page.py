@@ -13,14 +13,13 @@ from mocoflow_core.methods.ablations import change_of
 from mocoflow_core.methods.benchmark_folder import CellRecord
 from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.metrics.benchmark_tables import Contender, Runs
-from mocoflow_core.metrics.history import regressions
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import TimeToTarget
 from mocoflow_core.report.benchmark_chart import plot_benchmark
 from mocoflow_core.report.benchmark_results import BenchmarkResults
 from mocoflow_core.report.curve_plot import svg_of
 from mocoflow_core.report.history_chart import plot_history
-from mocoflow_core.report.history_words import margins_in_words
+from mocoflow_core.report.history_words import in_words, margins_in_words
 from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.misalignment_table import misalignment_tables
 from mocoflow_core.report.summary_table import (
@@ -75,13 +74,13 @@ def _context(results: BenchmarkResults, command: str) -> dict[str, Any]:
 
 def _nights(results: BenchmarkResults) -> dict[str, Any]:
     """What the history's section shows."""
-    now = results.tonight()
-    figure = plot_history(results.past, now, regressions(now, results.past))
+    found = results.regressions()
+    figure = plot_history(results.past, results.tonight(), found)
     return {
         "nights": len({row.night for row in results.past}),
         "history": None if figure is None else Markup(svg_of(figure)),
         "margins": margins_in_words(),
-        "regressions": results.regressions(),
+        "regressions": in_words(found),
     }
 
 

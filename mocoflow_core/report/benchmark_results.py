@@ -11,11 +11,10 @@ from mocoflow_core.methods.experiments import USUAL, Experiment
 from mocoflow_core.methods.past_benchmarks import night_rows
 from mocoflow_core.metrics.benchmark_tables import Runs
 from mocoflow_core.metrics.curve import CurveRow
-from mocoflow_core.metrics.history import NOW, HistoryRow, regressions
+from mocoflow_core.metrics.history import NOW, HistoryRow, Regression, regressions
 from mocoflow_core.metrics.misalignment import MisalignmentRow
 from mocoflow_core.metrics.table import ScoreRow
 from mocoflow_core.metrics.time_to_target import TimeToTarget
-from mocoflow_core.report.history_words import in_words
 from mocoflow_core.report.omissions import Omission, omissions
 from mocoflow_core.report.seed_summary import Summaries, summarise
 
@@ -46,9 +45,9 @@ class BenchmarkResults:
         """This night's numbers, as later ones will read them."""
         return night_rows(NOW, self.cells, self.summary_records())
 
-    def regressions(self) -> list[Omission]:
-        """What is worse than it usually was, in words."""
-        return [in_words(found) for found in regressions(self.tonight(), self.past)]
+    def regressions(self) -> list[Regression]:
+        """What is worse than it usually was."""
+        return regressions(self.tonight(), self.past)
 
     def summary_records(self) -> list[dict[str, Any]]:
         """The summaries as plain values, for ``benchmark.json``."""

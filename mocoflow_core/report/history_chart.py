@@ -63,7 +63,7 @@ def _panel(
         colour, style = look_of(contender, contenders)
         x, y = zip(*points, strict=True)
         axes.plot(x, y, ls=style, color=colour, lw=1.4, marker="o", ms=3)
-        if (contender, rows[0].measure) in rings:
+        if x[-1] == len(nights) - 1 and (contender, rows[0].measure) in rings:
             axes.plot(x[-1], y[-1], "o", ms=10, mfc="none", mec=WARM, mew=1.6, zorder=4)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.xaxis.set_major_formatter(lambda x, _: _night(nights, round(x)))

@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from mocoflow_core.metrics.benchmark_tables import Contender
 from mocoflow_core.metrics.history import FEWEST_NIGHTS, LAST_NIGHTS, MARGINS, Regression
 from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.omissions import Omission
 
 
-def in_words(found: Regression) -> Omission:
-    """What is worse, and by how much."""
-    name = "/".join(found.contender)
+def in_words(regressions: Sequence[Regression]) -> list[Omission]:
+    """What is worse and by how much; what a contender has no numbers of any more, together."""
+    worse = [_worse(found) for found in regressions if not math.isnan(found.value)]
+    gone: dict[Contender, list[Regression]] = {}
+    for found in regressions:
+        if math.isnan(found.value):
+            gone.setdefault(found.contender, []).append(found)
+    return worse + [_gone(contender, found) for contender, found in gone.items()]
+
+
+def _worse(found: Regression) -> Omission:
     label = label_of(found.measure)
-    if math.isnan(found.value):
-        usual = f"{label.with_unit(found.usual)} in the median of the last {found.nights} nights"
-        return Omission(f"{name}: {label.title}", f"no number, which was {usual}")
     loss = label.with_unit(abs(found.value - found.usual))
     margin = label.with_unit(MARGINS[found.measure].at(found.usual))
     return Omission(
-        f"{name}: {label.title}",
+        f"{'/'.join(found.contender)}: {label.title}",
         f"{label.with_unit(found.value)}, which is {loss} worse than "
         f"{label.with_unit(found.usual)}, the median of the last {found.nights} nights "
         f"(flagged above {margin})",
     )
+
+
+def _gone(contender: Contender, found: Sequence[Regression]) -> Omission:
+    usual = [
+        f"{label_of(one.measure).title} (usually {label_of(one.measure).with_unit(one.usual)})"
+        for one in found
+    ]
+    return Omission("/".join(contender), f"no number any more: {', '.join(usual)}")
 
 
 def margins_in_words() -> str:

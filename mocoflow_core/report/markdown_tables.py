@@ -8,6 +8,7 @@ from pathlib import Path
 from mocoflow_core.methods.ablations import change_of
 from mocoflow_core.methods.person_scores import PHOTOGRAPHS
 from mocoflow_core.report.benchmark_results import BenchmarkResults
+from mocoflow_core.report.history_words import in_words
 from mocoflow_core.report.markdown_text import code, plain
 from mocoflow_core.report.metric_labels import label_of
 from mocoflow_core.report.misalignment_table import misalignment_tables
@@ -79,7 +80,7 @@ def _misplaced(results: BenchmarkResults) -> Iterator[str]:
 
 
 def _missing(results: BenchmarkResults) -> Iterator[str]:
-    worse = results.regressions()
+    worse = in_words(results.regressions())
     if worse:
         yield from ("", "## Worse than usual", "")
         yield from (f"- {plain(found.what)}: {plain(found.why)}" for found in worse)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mocoflow_core.methods.benchmark_folder import BenchmarkFolder, BenchmarkRecord, CellRecord
-from mocoflow_core.methods.past_benchmarks import night_rows, past_nights
+from mocoflow_core.methods.past_benchmarks import night_rows, past_nights, read_nights
 from mocoflow_core.metrics.history import NOW
 
 MEAN = {"scene": "turn", "preset": "fast", "method": "mocoflow", "metric": "psnr", "mean": 20.0}
@@ -57,8 +57,11 @@ def test_finished_ones_that_asked_the_same_are_the_past(finish, tmp_path):
     BenchmarkFolder.claim(tmp_path / "unfinished", begun())
     (tmp_path / "unreadable").mkdir()
     (tmp_path / "unreadable/benchmark.json").write_text("{")
-    rows = past_nights(tmp_path / "now", begun())
+    nights = past_nights(tmp_path / "now", begun())
+    assert nights == ["first", "second"]
+    rows = read_nights(tmp_path, nights)
     assert sorted({row.night[:10] for row in rows}) == ["2026-01-01", "2026-01-02"]
+    assert {row.value for row in rows if row.measure == "psnr"} == {20.0}
 
 
 def test_a_benchmark_that_is_asked_for_again_keeps_its_place_among_the_nights(finish, tmp_path):
@@ -67,8 +70,7 @@ def test_a_benchmark_that_is_asked_for_again_keeps_its_place_among_the_nights(fi
     finish("third", "2026-01-03T01:00:00+00:00")
     again = BenchmarkFolder.claim(tmp_path / "second", begun())
     again = BenchmarkFolder.claim(tmp_path / "second", begun())  # The command line, then the flow.
-    rows = past_nights(again.path, again.begun)
-    assert {row.night[:10] for row in rows} == {"2026-01-01"}
+    assert past_nights(again.path, again.begun) == ["first"]
     assert again.finish({}).finished_at == "2026-01-02T01:00:00+00:00"
 
 

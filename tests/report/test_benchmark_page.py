@@ -124,6 +124,20 @@ def test_what_is_worse_than_in_the_nights_before_stands_above_and_beside_their_c
     assert "PSNR, person 0.3 dB" in nights
 
 
+def test_numbers_that_there_are_none_of_any_more_are_told_together(results, tmp_path):
+    past = [
+        HistoryRow(f"2026-01-0{night}", "", "walk", "fast", "mocoflow", measure, value)
+        for night in (1, 2, 3)
+        for measure, value in (("ssim", 0.9), ("oks", 0.8))
+    ]
+    path = tmp_path / "benchmark.html"
+    write_benchmark_page(replace(results, past=past), COMMAND, path)
+    page = path.read_text()
+    assert "1 number is worse" in page
+    assert "no number any more: OKS (usually 0.800), SSIM (usually 0.900)" in page
+    assert page.index("see which") < page.index('id="nights"')  # Though there is no chart.
+
+
 def test_a_benchmark_of_failures_alone_still_has_its_page(tmp_path):
     failed = [cell("mocoflow", 0, state="failed", reason="no masks", wall_s=None, machine={})]
     path = tmp_path / "benchmark.html"
