@@ -14,6 +14,8 @@ from tasks.source import Source
 from tasks.stage import Stage, Summary, stage
 
 ALGORITHM_VERSION = 5  # Half covered pixels stay before the plate.
+# About the shares of its time.
+EXTRACTED, CHECKED = 0.6, 0.75
 
 
 @stage(ClipArtifact, ALGORITHM_VERSION)
@@ -31,12 +33,13 @@ def extract_clip(
     """
     scene = open_scene(recording.path, recording.train_camera)
     only = bodies and frames_that_show(work.open(bodies), scene, capture.least_shown)
-    progress = work.part(0.0, extract.EXTRACTING)
+    progress = work.part(0.0, EXTRACTED)
     extracted = extract.extract_clip(scene, capture, needs, only, progress)
-    sound, warnings = sound_clip(extracted, capture.difference_threshold)
+    checking = work.part(EXTRACTED, CHECKED)
+    sound, warnings = sound_clip(extracted, capture.difference_threshold, checking)
     mask_files = {} if needs.masks else scene.masks(scene.train_camera)
     behind_person = capture.behind(scene)
-    composing = work.part(extract.EXTRACTING, 1.0)
+    composing = work.part(CHECKED, 1.0)
     clip = composite_clip(scene, sound, behind_person, mask_files, composing)
     selected, every = (
         len(extract.select_training_frames(scene, capture, some).all) for some in (only, None)

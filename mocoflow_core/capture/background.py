@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.progress import Progress, part_of, untold
+
 Frames = NDArray[np.uint8]  # (T, H, W, 3)
 Masks = NDArray[np.bool_]  # (T, H, W), true on the person
 # Sorts behind every colour.
@@ -13,25 +15,32 @@ _NEVER_SEEN = np.uint16(256)
 INPAINT_RADIUS_PX = 3
 
 
-def background_plate(frames: Frames, masks: Masks, margin_px: int) -> NDArray[np.uint8]:
+def background_plate(
+    frames: Frames, masks: Masks, margin_px: int, progress: Progress = untold
+) -> NDArray[np.uint8]:
     """Median colour (H, W, 3) over the frames in which the person does not cover the pixel.
 
     Masks are grown by ``margin_px`` because their edges are uncertain; pixels seen only closer to
     the person are taken with smaller margins, and those never seen are filled from around.
     """
+    passes = margin_px.bit_length() + 1
     plate, unseen = _masked_median(frames, _grown(masks, margin_px))
+    progress(1 / passes, "background plate")
     while margin_px > 0 and unseen.any():
         margin_px //= 2
         closer, still_unseen = _masked_median(frames, _grown(masks, margin_px))
         plate[unseen] = closer[unseen]
         unseen &= still_unseen
+        progress(1 - margin_px.bit_length() / passes, "background plate")
     if not unseen.any():
         return plate
     filled = cv2.inpaint(plate, unseen.astype(np.uint8), INPAINT_RADIUS_PX, cv2.INPAINT_TELEA)
     return filled.astype(np.uint8, copy=False)
 
 
-def plate_without_masks(frames: Frames, threshold: int, margin_px: int) -> NDArray[np.uint8]:
+def plate_without_masks(
+    frames: Frames, threshold: int, margin_px: int, progress: Progress = untold
+) -> NDArray[np.uint8]:
     """The plate (H, W, 3) of frames whose person is known from nothing but moving on.
 
     The median over all frames first; then the median over those that lie within ``threshold`` of
@@ -40,7 +49,8 @@ def plate_without_masks(frames: Frames, threshold: int, margin_px: int) -> NDArr
     """
     first, _ = _masked_median(frames, np.zeros(frames.shape[:3], bool))
     differs = np.stack([cv2.absdiff(frame, first).max(axis=-1) > threshold for frame in frames])
-    return background_plate(frames, differs, margin_px)
+    progress(0.3, "background plate")
+    return background_plate(frames, differs, margin_px, part_of(progress, 0.3, 1.0))
 
 
 def covered_share(masks: Masks) -> float:
@@ -48,12 +58,18 @@ def covered_share(masks: Masks) -> float:
     return float(masks.all(axis=0).mean())
 
 
-def masks_from_plate(frames: Frames, plate: NDArray[np.uint8], threshold: int) -> Masks:
+def masks_from_plate(
+    frames: Frames, plate: NDArray[np.uint8], threshold: int, progress: Progress = untold
+) -> Masks:
     """The largest region of each frame that differs from the plate by more than ``threshold``.
 
     The difference is the largest over the channels, in steps of 1/255.
     """
-    return np.stack([_largest_difference(frame, plate, threshold) for frame in frames])
+    masks = np.empty(frames.shape[:3], bool)
+    for row, frame in enumerate(frames):
+        masks[row] = _largest_difference(frame, plate, threshold)
+        progress((row + 1) / len(frames), "masks from the background")
+    return masks
 
 
 def _grown(masks: Masks, margin_px: int) -> Masks:

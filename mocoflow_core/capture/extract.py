@@ -31,10 +31,12 @@ from mocoflow_core.progress import Progress, part_of, untold
 Indices = NDArray[np.int32]
 Masks = NDArray[np.bool_]
 
-# About the share of the time that goes into a camera's clip before it is composited, and of that
-# into its frames before its masks.
+# About the shares of the time after which a camera's clip is there, before it is composited; and
+# of that, after which the train camera's is there with all its frames; and of a clip, after which
+# its frames are there, its masks, and the plate that is made from both.
 EXTRACTING = 0.7
-DECODING = 0.8
+COMPARING = 0.8
+DECODING, MASKING, PLATING = 0.6, 0.8, 0.9
 
 
 class CaptureConfig(ConfigurationPart):
@@ -110,9 +112,11 @@ def extract_clip(
     Raises InputError when frames or masks are missing, and when sizes disagree.
     """
     selection = select_training_frames(scene, configuration, only)
-    clip = extract_camera(scene, scene.train_camera, selection, configuration, needs, progress)
+    extracting, comparing = part_of(progress, 0.0, COMPARING), part_of(progress, COMPARING, 1.0)
+    clip = extract_camera(scene, scene.train_camera, selection, configuration, needs, extracting)
     if not needs.repeated_frames:
-        clip = clip.at_rows(~repeated_frames(clip.frames, clip.masks, ~clip.held_out))
+        repeated = repeated_frames(clip.frames, clip.masks, ~clip.held_out, comparing)
+        clip = clip.at_rows(~repeated)
     if not clip.masks.any():
         raise InputError(
             f"{scene.train_camera} must show the person in a mask",
@@ -198,25 +202,28 @@ def extract_camera(
     # Held-out frames must not be trained on, and the plate is part of the training.
     usable = np.flatnonzero(~held_out) if len(selection.working) else np.arange(len(indices))
     remarks = []
+    threshold = configuration.difference_threshold
+    masking, plating = part_of(progress, DECODING, MASKING), part_of(progress, MASKING, PLATING)
+    differing = part_of(progress, PLATING, 1.0)
     if mask_files:
-        masks = working_masks(mask_files, indices, view, part_of(progress, DECODING, 1.0))
+        masks = working_masks(mask_files, indices, view, masking)
     else:
         if plate is None:
-            plate, _ = _plate(frames, None, usable, configuration)
+            plate, _ = _plate(frames, None, usable, configuration, masking)
             remarks.append(
                 f"{name} has neither masks nor a background picture: the person is what differs "
                 "from the median of its frames, shadows with it"
             )
-        masks = masks_from_plate(frames, plate, configuration.difference_threshold)
+        masks = masks_from_plate(frames, plate, threshold, differing)
     if plate is None or needs.background:
-        plate, guessed = _plate(frames, masks, usable, configuration)
+        plate, guessed = _plate(frames, masks, usable, configuration, plating)
         if guessed and configuration.behind(scene) != "white":
             remarks.append(
                 f"the person covers {100 * guessed:.2g} % of the picture of {name} in every "
                 "frame: the background there is filled from around"
             )
     if needs.masks:
-        masks = masks_from_plate(frames, plate, configuration.difference_threshold)
+        masks = masks_from_plate(frames, plate, threshold, differing)
     return Clip(
         camera=view.camera,
         fps=selection.fps,
@@ -235,6 +242,7 @@ def _plate(
     masks: Masks | None,
     usable: NDArray[np.intp],
     configuration: CaptureConfig,
+    progress: Progress,
 ) -> tuple[NDArray[np.uint8], float]:
     """The plate of some frames, and the share of it that none of them shows."""
     count = min(len(usable), configuration.background_frames)
@@ -242,5 +250,6 @@ def _plate(
     margin_px = round(configuration.background_margin * max(frames.shape[1:3]))
     if masks is None:
         threshold = configuration.difference_threshold
-        return plate_without_masks(frames[chosen], threshold, margin_px), 0.0
-    return background_plate(frames[chosen], masks[chosen], margin_px), covered_share(masks[chosen])
+        return plate_without_masks(frames[chosen], threshold, margin_px, progress), 0.0
+    plate = background_plate(frames[chosen], masks[chosen], margin_px, progress)
+    return plate, covered_share(masks[chosen])

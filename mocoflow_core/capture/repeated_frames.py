@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mocoflow_core.progress import Progress, untold
+
 # The person's pixels may change by so much more than the background's, and still be still:
 # what changes there is the camera's noise.
 NOISE_RATIO = 1.3
@@ -15,7 +17,10 @@ LARGEST_NOISE = 4.0
 
 
 def repeated_frames(
-    frames: NDArray[np.uint8], masks: NDArray[np.bool_], working: NDArray[np.bool_]
+    frames: NDArray[np.uint8],
+    masks: NDArray[np.bool_],
+    working: NDArray[np.bool_],
+    progress: Progress = untold,
 ) -> NDArray[np.bool_]:
     """Which working frames (T,) repeat the last one that is kept.
 
@@ -32,6 +37,7 @@ def repeated_frames(
         return repeated
     kept = rows[0]
     for row in rows[1:-1]:
+        progress(row / len(frames), "frames compared")
         repeated[row] = _shows_the_same(frames[kept], frames[row], masks[kept] | masks[row])
         kept = kept if repeated[row] else row
     return repeated

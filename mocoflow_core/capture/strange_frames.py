@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocoflow_core.capture.clip import Clip
+from mocoflow_core.progress import Progress, untold
 
 Shares = NDArray[np.float64]
 
@@ -49,13 +50,15 @@ class FrameFindings:
     detour: Shares  # difference to both neighbours over their own; 0 where there are none
 
 
-def sound_clip(clip: Clip, threshold: int) -> tuple[Clip, tuple[str, ...]]:
+def sound_clip(
+    clip: Clip, threshold: int, progress: Progress = untold
+) -> tuple[Clip, tuple[str, ...]]:
     """The clip without broken frames and without empty masks where somebody is seen; warnings.
 
     Args:
         threshold: difference to the plate that counts as a change, in steps of 1/255.
     """
-    found = measure_frames(clip, threshold)
+    found = measure_frames(clip, threshold, progress)
     training = ~clip.held_out
     broken = found.changed > LARGEST_CHANGE
     warnings = []
@@ -91,7 +94,7 @@ def sound_clip(clip: Clip, threshold: int) -> tuple[Clip, tuple[str, ...]]:
     return _selected(clip, ~broken, silent), tuple(warnings)
 
 
-def measure_frames(clip: Clip, threshold: int) -> FrameFindings:
+def measure_frames(clip: Clip, threshold: int, progress: Progress = untold) -> FrameFindings:
     """Compare every frame with the background plate outside its grown mask."""
     side = 2 * max(round(MARGIN * max(clip.masks.shape[1:])), 1) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
@@ -105,6 +108,7 @@ def measure_frames(clip: Clip, threshold: int) -> FrameFindings:
         count = int((differs & outside).sum())
         changed[row] = count / max(int(outside.sum()), 1)
         surplus[row] = count / person
+        progress((row + 1) / len(area), f"frame {clip.frame_indices[row]} checked")
     return FrameFindings(changed, surplus, area, _detours(clip))
 
 

@@ -19,6 +19,7 @@ from mocoflow_core.errors import InputError
 from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.estimate_file import EstimateFile, read_stored
+from mocoflow_core.progress import Progress, untold
 
 TOOL = "AIST++ motion"
 PARTS = {"smpl_poses", "smpl_trans", "smpl_scaling"}
@@ -43,7 +44,10 @@ def read_motion(path: Path) -> Motion:
 
 
 def motion_vertices(
-    motion: Motion, model: SmplModel, rows: NDArray[np.integer] | None = None
+    motion: Motion,
+    model: SmplModel,
+    rows: NDArray[np.integer] | None = None,
+    progress: Progress = untold,
 ) -> NDArray[np.float32]:
     """Bodies (T, V, 3) in world **metres**, at true scale: the world divided by 100.
 
@@ -54,7 +58,7 @@ def motion_vertices(
         rows: of the motion; all of them where not given.
     """
     chosen = np.arange(len(motion)) if rows is None else rows
-    bodies = posed_vertices(model, motion.poses[chosen], np.zeros(1))
+    bodies = posed_vertices(model, motion.poses[chosen], np.zeros(1), progress=progress)
     placed_cm = motion.scaling * bodies + motion.translations_cm[chosen, None]
     return (METRES * placed_cm).astype(np.float32)
 
@@ -72,7 +76,7 @@ def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
         source=TOOL,
         frame_indices=np.arange(len(motion), dtype=np.int32),
         numbering="position",
-        vertices=motion_vertices(motion, model),
+        vertices=motion_vertices(motion, model, progress=context.progress),
         faces=model.faces.astype(np.int32),
         coordinates="world",
         located=True,

@@ -21,6 +21,7 @@ from mocoflow_core.estimators.context import EstimateContext
 from mocoflow_core.estimators.estimate import BodyEstimate
 from mocoflow_core.estimators.estimate_file import EstimateFile, frame_numbers, read_stored
 from mocoflow_core.estimators.tracks import Track, choose_track
+from mocoflow_core.progress import Progress, untold
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,7 @@ def read(stored: EstimateFile, context: EstimateContext) -> BodyEstimate:
         track.floats("Rh", 3),
         track.floats("Th", 3),
         with_blend_shapes,
+        context.progress,
     )
     return BodyEstimate(
         source=TOOL,
@@ -79,6 +81,7 @@ def turned_bodies(
     Rh: Array,
     Th: Array,
     pose_blend_shapes: bool = True,
+    progress: Progress = untold,
 ) -> Array:
     """Bodies (T, V, 3) in world metres: ``R(Rh) SMPL(poses, shape) + Th``, about the origin.
 
@@ -88,7 +91,9 @@ def turned_bodies(
         Rh, Th: (T, 3) axis-angle and metres.
         pose_blend_shapes: whether the bodies were fitted with them.
     """
-    bodies = posed_vertices(model, poses, shape, pose_directions=pose_blend_shapes)
+    bodies = posed_vertices(
+        model, poses, shape, pose_directions=pose_blend_shapes, progress=progress
+    )
     turns = Rotation.from_rotvec(Rh).as_matrix()
     return np.einsum("tij,tvj->tvi", turns, bodies) + Th[:, None]
 

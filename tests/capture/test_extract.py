@@ -19,6 +19,7 @@ from mocoflow_core.capture.extract import (
     extract_evaluation,
 )
 from mocoflow_core.capture.scene import open_scene
+from mocoflow_core.capture.strange_frames import sound_clip
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.video import write_video
 from tests.capsule_person import (
@@ -302,3 +303,29 @@ def test_a_frame_that_is_shown_twice_is_worked_on_once(folder):
     assert extract_clip(scene, CaptureConfig()).frame_indices.tolist() == [0, 1, 2, 4, 5]
     kept = extract_clip(scene, CaptureConfig(), ClipNeeds(repeated_frames=True))
     assert kept.frame_indices.tolist() == [0, 1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize(
+    ("needs", "phase"),
+    [
+        (ClipNeeds(), "mask 0 of cam00"),
+        (ClipNeeds(background=True), "background plate"),
+        (ClipNeeds(masks=True), "masks from the background"),
+        (ClipNeeds(background=True, masks=True), "masks from the background"),
+    ],
+)
+def test_how_far_it_is_only_grows_through_all_that_takes_long(folder, needs, phase):
+    told = []
+    extract_clip(open_scene(folder), CaptureConfig(), needs, progress=lambda *now: told.append(now))
+    shares, words = zip(*told, strict=True)
+    assert list(shares) == sorted(shares)
+    assert 0 < shares[0] < shares[-1] <= 1
+    assert {"frame 0 of cam00", phase, "frames compared"} <= set(words)
+
+
+def test_checking_a_clip_tells_of_every_frame(folder):
+    told = []
+    clip = extracted(folder)
+    sound_clip(clip, 30, lambda *now: told.append(now))
+    assert [share for share, _ in told] == [(n + 1) / len(clip.frames) for n in range(len(told))]
+    assert told[-1][0] == 1
