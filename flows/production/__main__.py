@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -43,12 +44,31 @@ def down(state: State) -> None:
 
 
 @app.command()
-def deploy() -> None:
-    """Make the pool, automation, deployments and schedules on the server of PREFECT_API_URL."""
+def deploy(state: State) -> None:
+    """Make pool, automations, deployments and schedules: of this machine's site, or elsewhere.
+
+    Elsewhere is the server of PREFECT_API_URL, with the variables of the environment.
+    """
+    os.environ |= _site_or_server(state.resolve())
+    # Prefect reads its settings when it is imported.
     from flows.production.deploy import deploy as bring_up_to_date
 
     for line in bring_up_to_date():
         typer.echo(line)
+
+
+def _site_or_server(folder: Path) -> dict[str, str]:
+    """The environment of the site in a folder, unless another server is asked for."""
+    site, server = Site.of_folder(folder), os.environ.get("PREFECT_API_URL")
+    if site and server in (None, "", site.api):
+        return site.environment()
+    if server:
+        return {}
+    raise InputError(
+        "PREFECT_API_URL, or a site that `make up` has made",
+        f"neither, and none in {folder}",
+        "make up, or export PREFECT_API_URL=http://HOST:4200/api.",
+    )
 
 
 if __name__ == "__main__":

@@ -11,9 +11,7 @@ from prefect.client.orchestration import SyncPrefectClient
 from prefect.events.schemas.automations import AutomationCore
 from prefect.exceptions import ObjectNotFound
 
-from mocoflow_core.errors import InputError
-
-BLOCK = "MOCOFLOW_NOTIFICATION_BLOCK"
+from flows.production.settings import BLOCK
 
 
 def make_automation(client: SyncPrefectClient, content: dict[str, Any]) -> None:
@@ -30,17 +28,16 @@ def make_automation(client: SyncPrefectClient, content: dict[str, Any]) -> None:
 def make_notifications(client: SyncPrefectClient, contents: Sequence[dict[str, Any]]) -> str:
     """Let the block that the environment names tell of what they wait for; say who is told.
 
-    Where it names none, there are none afterwards.
-
-    Raises InputError for a block that the server does not have.
+    Where it names none, or one that the server does not have, there are none afterwards.
     """
-    name = os.environ.get(BLOCK)
-    if not name:
+    name = os.environ.get(BLOCK, "")
+    block = _block_id(client, name)
+    if block is None:
         for content in contents:
             for found in _named(client, content["name"]):
                 client.request("DELETE", "/automations/{id}", path_params={"id": found})
-        return f"nobody is told of failures and regressions: set {BLOCK} and deploy again"
-    block = _block_id(client, name)
+        why = f"{name} is no block of the server: make it on the page Blocks" if name else "set one"
+        return f"nobody is told of failures and regressions ({BLOCK}): {why}, deploy again"
     for content in contents:
         actions = [{**action, "block_document_id": block} for action in content["actions"]]
         make_automation(client, {**content, "actions": actions})
@@ -53,13 +50,10 @@ def _named(client: SyncPrefectClient, name: str) -> list[str]:
     return [automation["id"] for automation in found]
 
 
-def _block_id(client: SyncPrefectClient, name: str) -> str:
+def _block_id(client: SyncPrefectClient, name: str) -> str | None:
+    """Of a block that is named as ``slack-webhook/ops``."""
     kind, _, own = name.partition("/")
     with suppress(ObjectNotFound):
         if own:
             return str(client.read_block_document_by_name(own, kind).id)
-    raise InputError(
-        f"{BLOCK} must be a block of the server, as slack-webhook/ops",
-        repr(name),
-        "Make it on the page Blocks, then deploy again.",
-    )
+    return None

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
 import yaml
+from httpx import HTTPStatusError
 from prefect.client.orchestration import SyncPrefectClient, get_client
 from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
 from prefect.exceptions import ObjectNotFound
@@ -26,11 +29,12 @@ def deploy() -> list[str]:
 
     The schedule of a data set runs where its root is a folder, and is paused where it is not.
 
-    Raises InputError outside of the repository's root.
+    Raises InputError outside of the repository's root, for a store that cannot be made, and where
+    the server wants another password.
     """
     pool = _read("pool.yaml")
     make_store()
-    with get_client(sync_client=True) as client:
+    with _let_in(), get_client(sync_client=True) as client:
         _make_pool(client, pool)
         for queue in pool["queues"]:
             _make_queue(client, pool["name"], queue)
@@ -41,9 +45,22 @@ def deploy() -> list[str]:
             for deployment in _read("prefect.yaml")["deployments"]
             for line in _set_schedules(client, deployment)
         ]
-        # Last: a block that is not there must keep no deployment away.
         told = make_notifications(client, _read("notifications.yaml")["automations"])
     return [*schedules, told]
+
+
+@contextmanager
+def _let_in() -> Iterator[None]:
+    try:
+        yield
+    except HTTPStatusError as error:
+        if error.response.status_code != HTTPStatus.UNAUTHORIZED:
+            raise
+        raise InputError(
+            "the password of the server",
+            "another one, or none",
+            "export PREFECT_API_AUTH_STRING=user:password.",
+        ) from error
 
 
 def _read(name: str) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
-from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT, STORE
-from flows.data_set_roots import ROOTS
+from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT
+from flows.production.settings import KEPT, told
 from flows.user_folders import data_folder, results_folder
 from mocoflow_core.errors import InputError
 
@@ -26,8 +26,9 @@ class Database(StrEnum):
 MARK = "MOCOFLOW_SITE"
 PREFECT = (sys.executable, "-m", "prefect")
 AUTHENTICATION = "PREFECT_SERVER_API_AUTH_STRING"
-# What a worker's runs are told about folders and stores.
-WORKER_VARIABLES = (DATA_ROOTS, RESULTS_ROOT, STORE, *ROOTS.values())
+# Slots that a run holds outlive the server: in its memory they would be lost, and stay taken.
+LEASES = "PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE"
+LEASES_IN_FILES = "prefect.server.concurrency.lease_storage.filesystem"
 
 
 def default_folder() -> Path:
@@ -65,7 +66,7 @@ class Site:
         return self.folder / f"{name}.pid"
 
     def environment(self, database_url: str | None = None) -> dict[str, str]:
-        """Of the site's processes: the user's own, with the site's settings.
+        """Of the site's processes: the user's own, with the site's settings, also of earlier times.
 
         Runs are confined to folders: the user's, or else those that mocoflow has among their data.
         An empty variable counts as none, and a relative path lies below the working directory.
@@ -81,15 +82,15 @@ class Site:
             "DO_NOT_TRACK": "1",
             "PREFECT_FLOWS_HEARTBEAT_FREQUENCY": "30",
             "NO_COLOR": "1",
+            LEASES: LEASES_IN_FILES,
         }
         if secret := os.environ.get(AUTHENTICATION):
             chosen |= {AUTHENTICATION: secret, "PREFECT_API_AUTH_STRING": secret}
         if database_url:
             chosen["PREFECT_SERVER_DATABASE_CONNECTION_URL"] = database_url
         roots = {DATA_ROOTS: str(data_folder()), RESULTS_ROOT: str(results_folder())}
-        told = {name: value for name in WORKER_VARIABLES if (value := _told(name))}
-        chosen |= roots | told
-        ours = (AUTHENTICATION, *WORKER_VARIABLES)
+        chosen |= roots | told(self.folder)
+        ours = (AUTHENTICATION, *KEPT)
         return {name: v for name, v in os.environ.items() if name not in ours} | chosen
 
     def save(self) -> None:
@@ -122,12 +123,3 @@ class Site:
             )
         site = before or cls(folder)
         return replace(site, port=port or site.port, database=database or site.database)
-
-
-def _told(name: str) -> str:
-    """A worker's variable, whose working directory is another; empty where it is not set."""
-    value = os.environ.get(name, "")
-    if name == STORE and ("://" in value or "::" in value):
-        return value
-    paths = value.split(os.pathsep) if name == DATA_ROOTS else [value]
-    return os.pathsep.join(str(Path(path).absolute()) for path in paths if path)

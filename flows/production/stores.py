@@ -5,14 +5,23 @@ from __future__ import annotations
 import os
 
 from flows.allowed_folders import STORE
+from mocoflow_core.errors import InputError
+from mocoflow_core.io.remote_store import file_system
+from mocoflow_core.io.retry import persistent
 
 
-def make_store() -> str | None:
-    """Make the place of ``MOCOFLOW_STORE``, where it is set; give its address."""
+def make_store() -> None:
+    """Make the place of ``MOCOFLOW_STORE``, where it is set.
+
+    Raises InputError for an address that cannot be opened, or not be written.
+    """
     address = os.environ.get(STORE)
-    if address:
-        from fsspec.core import url_to_fs
-
-        files, place = url_to_fs(address)
-        files.makedirs(place, exist_ok=True)
-    return address or None
+    if not address:
+        return
+    files, place = file_system(address)
+    try:
+        persistent(address, lambda: files.makedirs(place, exist_ok=True))
+    except FileNotFoundError as error:
+        raise InputError(
+            f"{STORE} must be a place that can be made", f"{address} ({error})", "Choose another."
+        ) from error

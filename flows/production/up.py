@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
 
-from flows.allowed_addresses import CLUSTER_ADDRESSES
 from flows.production.api import admits, answers, ask, wait_for
 from flows.production.postgresql import PostgreSQL
 from flows.production.processes import end_what_is_left, is_running, start, stop
-from flows.production.site import AUTHENTICATION, PREFECT, WORKER_VARIABLES, Database, Site
+from flows.production.settings import FIXED, KEPT, keep, kept
+from flows.production.site import AUTHENTICATION, PREFECT, Database, Site
 from mocoflow_core.errors import InputError
 
 POOL = "mocoflow"
 RUNS_AT_ONCE = 2
 # A first start on a busy machine.
 STARTS_WITHIN_S = 300.0
-WORKER_SETTINGS = "worker.json"
-# What a worker was told when it was started.
-COMPARED = (*WORKER_VARIABLES, CLUSTER_ADDRESSES)
 UNDER_WAY = ("RUNNING", "PENDING", "CANCELLING")
 
 
@@ -48,13 +45,12 @@ def bring_up(site: Site) -> Iterator[str]:
     _require(wait_for(lambda: answers(site.api), STARTS_WITHIN_S), site, "server")
     _require_the_same_password(site)
     yield f"server       {site.api}"
-    words = [sys.executable, "-m", "flows.production", "deploy"]
-    subprocess.run(words, env=site.environment(), check=True)
+    keep(site.folder, _settings(site))
+    _deploy(site)
     _pause(site, False)
     if not is_running(site, "worker"):
         words = ["worker", "start", "--pool", POOL, "--name", _worker()]
         limit = ["--limit", str(RUNS_AT_ONCE)]
-        _write_settings(site)
         start(site, "worker", [*PREFECT, *words, *limit], site.environment())
     _require(wait_for(lambda: _is_online(site), STARTS_WITHIN_S), site, "worker")
     roots = site.environment()
@@ -63,6 +59,7 @@ def bring_up(site: Site) -> Iterator[str]:
     yield f"results      {roots['MOCOFLOW_RESULTS_ROOT']}"
     yield f"logs         {site.logs}"
     yield f"pages        {site.pages}"
+    yield f"prefect      export PREFECT_API_URL={site.api} PATH={Path(sys.executable).parent}:$PATH"
 
 
 def take_down(site: Site, grace_s: float = 60.0) -> Iterator[str]:
@@ -92,6 +89,16 @@ def _start_server(site: Site, url: str | None) -> None:
             )
     words = ["server", "start", "--host", "127.0.0.1", "--port", str(site.port)]
     start(site, "server", [*PREFECT, *words], site.environment(url))
+
+
+def _deploy(site: Site) -> None:
+    """In a process of its own, as Prefect reads its settings when it is imported."""
+    words = [sys.executable, "-m", "flows.production", "deploy", "--state", str(site.folder)]
+    if subprocess.run(words, env=site.environment()).returncode != 0:
+        raise RuntimeError(
+            "what is written above kept the deployments from being made, and no worker was "
+            "started. Mend it, and `make up` again."
+        )
 
 
 def _cancel_runs(site: Site, grace_s: float) -> Iterator[str]:
@@ -161,8 +168,8 @@ def _require_the_same_worker(site: Site) -> None:
     """A schedule that is due would otherwise find a worker without the data set's root."""
     if not is_running(site, "worker"):
         return
-    before, now = json.loads((site.folder / WORKER_SETTINGS).read_text()), _settings(site)
-    differ = [name for name in COMPARED if before.get(name) != now.get(name)]
+    before, now = kept(site.folder), _settings(site)
+    differ = [name for name in FIXED if before.get(name) != now.get(name)]
     if differ:
         raise InputError(
             "the settings that the running worker was started with",
@@ -183,12 +190,4 @@ def _require_the_same_password(site: Site) -> None:
 
 
 def _settings(site: Site) -> dict[str, str]:
-    return {n: v for n, v in site.environment().items() if v and n in COMPARED}
-
-
-def _write_settings(site: Site) -> None:
-    """For their owner alone: a store's address may have a password in it."""
-    file = site.folder / WORKER_SETTINGS
-    file.touch()
-    file.chmod(0o600)
-    file.write_text(json.dumps(_settings(site)) + "\n")
+    return {name: value for name, value in site.environment().items() if name in KEPT}

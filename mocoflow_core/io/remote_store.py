@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from fsspec import AbstractFileSystem
 from fsspec.core import url_to_fs
 
 from mocoflow_core.errors import InputError
@@ -26,18 +27,23 @@ SENDINGS = 3
 
 def open_store(url: str, mirrors: Path) -> Store:
     """The store at a folder or fsspec address; remote stores are mirrored below ``mirrors``."""
-    try:
-        filesystem, base = url_to_fs(url)
-    except (ImportError, ValueError) as error:
-        raise InputError(
-            "The store needs a folder or an address that fsspec can open",
-            f"{url!r} ({error})",
-            "Correct --store, or install the file system's package.",
-        ) from error
+    filesystem, base = file_system(url)
     if "file" in filesystem.protocol:
         return Store(Path(base))
     files = RemoteFiles(url, filesystem, base)
     return RemoteStore(files, mirrors / digest_document(url)[:16])
+
+
+def file_system(url: str) -> tuple[AbstractFileSystem, str]:
+    """What fsspec opens at an address, and the folder there. Raises InputError where nothing is."""
+    try:
+        return url_to_fs(url)
+    except (ImportError, ValueError) as error:
+        raise InputError(
+            "The store needs a folder or an address that fsspec can open",
+            f"{url!r} ({error})",
+            "Correct --store or MOCOFLOW_STORE, or install the file system's package.",
+        ) from error
 
 
 class RemoteStore(Store):

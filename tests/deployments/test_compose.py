@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from flows.production.site import LEASES, LEASES_IN_FILES
 from flows.user_folders import body_models_folder
 
 ROOT = Path(__file__).parents[2]
@@ -140,3 +141,10 @@ def test_what_the_image_is_made_of_is_sent_to_the_builder():
     for name in " ".join(copied).split():
         assert f"!{name}" in sent
         assert (ROOT / name).exists()
+
+
+def test_slots_that_runs_hold_outlive_the_server():
+    server = SERVICES["server"]
+    assert server["environment"][LEASES] == LEASES_IN_FILES
+    home = re.search(r"PREFECT_HOME=(\S+)", DOCKERFILE)[1]
+    assert any(home.startswith(volume.partition(":")[2]) for volume in server["volumes"])

@@ -79,7 +79,12 @@ def test_what_a_clock_starts_runs_one_at_a_time_and_in_its_own_queue(deployment)
     assert (deployment["work_pool"]["work_queue_name"] == "by-clock") == by_clock
     for schedule in deployment["schedules"]:
         Cron(schedule["cron"], timezone=schedule["timezone"])
-        assert deployment["concurrency_limit"]["limit"] == 1
+    assert {q["name"]: q["concurrency_limit"] for q in POOL["queues"]}["by-clock"] == 1
+
+
+@pytest.mark.parametrize("deployment", DEPLOYMENTS, ids=lambda d: d["name"])
+def test_no_run_holds_a_lease_that_ends_it_when_the_server_has_forgotten_it(deployment):
+    assert "concurrency_limit" not in deployment
 
 
 @pytest.mark.parametrize("name", ROOTS)

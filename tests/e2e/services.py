@@ -15,6 +15,7 @@ from pathlib import Path
 from urllib.error import HTTPError, URLError
 from urllib.request import urlopen
 
+from flows.production.site import LEASES, LEASES_IN_FILES
 from tests.e2e.production import POOL, ROOT, Production
 from tests.free_port import free_port
 
@@ -104,6 +105,7 @@ def services(root: Path, database: str | None = None) -> Iterator[Services]:
         "PREFECT_LOGGING_TO_API_ENABLED": "true",
         "PREFECT_FLOWS_HEARTBEAT_FREQUENCY": "30",
         "PREFECT_WORKER_QUERY_SECONDS": "2",
+        LEASES: LEASES_IN_FILES,
         "XDG_CACHE_HOME": str(root / "cache"),
         "PYTHONPATH": str(ROOT),
         "DO_NOT_TRACK": "1",

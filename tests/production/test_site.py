@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 from flows.production.postgresql import find_programs
-from flows.production.site import AUTHENTICATION, WORKER_VARIABLES, Database, Site
+from flows.production.settings import BLOCK, FILE, WORKER_VARIABLES, keep, kept
+from flows.production.site import AUTHENTICATION, Database, Site
 from flows.production.up import bring_up
 from mocoflow_core.errors import InputError
 
@@ -33,6 +32,29 @@ def test_a_site_is_not_given_an_empty_database_in_place_of_its_own(tmp_path):
     Site(tmp_path, 4321, Database.POSTGRESQL).save()
     with pytest.raises(InputError, match=r"postgresql, in which .* keeps its runs, got sqlite"):
         Site.asked_for(tmp_path, database=Database.SQLITE)
+
+
+def test_a_site_keeps_what_it_was_told_until_it_is_told_otherwise(tmp_path, monkeypatch):
+    def up(**told):
+        with monkeypatch.context() as once:
+            for name in (*WORKER_VARIABLES, BLOCK):
+                once.delenv(name, raising=False)
+            for name, value in told.items():
+                once.setenv(name, value)
+            found = Site(tmp_path).environment()
+        keep(tmp_path, {name: value for name, value in found.items() if "MOCOFLOW_" in name})
+        return found.get("MOCOFLOW_AIST_ROOT"), found.get(BLOCK)
+
+    assert up() == (None, None)
+    assert up(MOCOFLOW_AIST_ROOT="/sets/aist") == ("/sets/aist", None)
+    assert up(MOCOFLOW_NOTIFICATION_BLOCK="slack-webhook/ops") == (
+        "/sets/aist",
+        "slack-webhook/ops",
+    )
+    assert up() == ("/sets/aist", "slack-webhook/ops")
+    assert up(MOCOFLOW_AIST_ROOT="") == (None, "slack-webhook/ops")
+    assert kept(tmp_path)[BLOCK] == "slack-webhook/ops"
+    assert (tmp_path / FILE).stat().st_mode & 0o077 == 0
 
 
 @pytest.mark.parametrize("empty", ["", ":", "::"])
@@ -115,8 +137,7 @@ def test_a_running_worker_is_not_left_without_a_root_that_is_new(tmp_path, monke
     site = Site(tmp_path, 4321)
     site.save()
     monkeypatch.delenv("MOCOFLOW_AIST_ROOT", raising=False)
-    settings = {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")}
-    (tmp_path / "worker.json").write_text(json.dumps(settings))
+    keep(tmp_path, {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")})
     monkeypatch.setattr("flows.production.up.is_running", lambda *_: True)
     monkeypatch.setenv("MOCOFLOW_AIST_ROOT", "/sets/aist")
     with pytest.raises(InputError, match=r"another MOCOFLOW_AIST_ROOT\. Take it down"):
