@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +14,7 @@ from flows.list_options import ListOptions
 
 if TYPE_CHECKING:
     from mocoflow_core.io.garbage import Sentence
-    from mocoflow_core.io.holdings import Holdings
+    from mocoflow_core.io.holdings import Held, Holdings
     from mocoflow_core.io.known_runs import KnownRun
 
 DAY_S = 86400.0
@@ -51,25 +52,29 @@ def list_artifacts(store: Address = None, runs: RunFolders = None) -> None:
 
 
 @store_app.command("verify")
-def verify(store: Address = None) -> None:
+def verify(
+    store: Address = None,
+    remove: Annotated[
+        bool,
+        typer.Option(
+            "--remove", help="Remove what is damaged: the next run uploads or computes it anew."
+        ),
+    ] = False,
+) -> None:
     """Read everything and compare its digests; exit code 1 where an artifact is damaged."""
-    from flows.store_table import summary
-    from tasks.terminal_bar import terminal_bar
-
-    damaged = 0
-    for place in _places(store):
-        held = place.look()
-        with terminal_bar("verify") as progress:
-            for done, item in enumerate(held):
-                progress(done / len(held), item.name)
-                fault = item.fault if item.leftover else item.fault or place.verify(item)
-                damaged += bool(fault) and not item.leftover
-                if fault:
-                    typer.echo(f"{'leftover' if item.leftover else 'damaged'} {item.name}: {fault}")
-        typer.echo(f"{place.place}: {summary(held)}")
-    typer.echo(f"{damaged} damaged" if damaged else "Nothing is damaged.")
+    begun = time.time()
+    damaged = [pair for place in _places(store) for pair in _damaged(place, place.look())]
+    typer.echo(f"{len(damaged)} damaged" if damaged else "Nothing is damaged.")
+    if remove:
+        # Of use to nobody, also where a run needs it; what was written since begun may be whole.
+        removed = [p.remove(replace(item, used_at=begun), lambda: False) for p, item in damaged]
+        typer.echo(f"{sum(removed)} removed: the next run uploads or computes them anew.")
+    elif damaged:
+        typer.echo(
+            "A run that needs a damaged artifact computes it again, but on object storage not the "
+            "machine that holds it whole: --remove lets that one upload it."
+        )
     if damaged:
-        typer.echo("A run that needs a damaged artifact computes it again.")
         raise typer.Exit(1)
 
 
@@ -125,6 +130,24 @@ def _places(store: str | None) -> tuple[Holdings, ...]:
     from mocoflow_core.io.remote_holdings import holdings_of
 
     return holdings_of(open_users_store(store))
+
+
+def _damaged(place: Holdings, held: Sequence[Held]) -> list[tuple[Holdings, Held]]:
+    """Read a place's artifacts and say what is wrong with each; leftovers are not counted."""
+    from flows.store_table import summary
+    from tasks.terminal_bar import terminal_bar
+
+    damaged = []
+    with terminal_bar("verify") as progress:
+        for done, item in enumerate(held):
+            progress(done / len(held), item.name)
+            fault = item.fault if item.leftover else item.fault or place.verify(item)
+            if fault:
+                typer.echo(f"{'leftover' if item.leftover else 'damaged'} {item.name}: {fault}")
+            if fault and not item.leftover:
+                damaged.append((place, item))
+    typer.echo(f"{place.place}: {summary(held)}")
+    return damaged
 
 
 def _known(places: Sequence[Holdings]) -> list[KnownRun]:

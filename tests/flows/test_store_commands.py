@@ -10,10 +10,13 @@ from typer.testing import CliRunner
 
 from flows.command_line import app
 from flows.user_folders import this_machine
+from flows.users_store import open_users_store
 from mocoflow_core.artifacts import ClipArtifact, PlanArtifact
 from mocoflow_core.errors import InputError
 from mocoflow_core.io.holdings import FolderHoldings
 from mocoflow_core.io.known_runs import KnownRun
+from mocoflow_core.io.manifest import MANIFEST
+from mocoflow_core.io.remote_store import file_system
 from mocoflow_core.io.run_folder import RunFolder, RunRecord, StageRecord
 from mocoflow_core.io.store import Store
 
@@ -63,6 +66,34 @@ def test_verify_names_what_is_damaged_and_fails(store):
     output = said("verify", "--store", store.url, code=1)
     assert f"damaged {CLIP}: payload has changed since it was written" in output
     assert PLAN not in output
+
+
+def test_verify_removes_what_is_damaged_where_it_is_told_to(store):
+    (store.root / CLIP / "payload").write_bytes(1000 * b"y")
+    assert "--remove" in said("verify", "--store", store.url, code=1)
+    assert "1 removed" in said("verify", "--store", store.url, "--remove", code=1)
+    assert "Nothing is damaged." in said("verify", "--store", store.url)
+    assert (store.root / PLAN).is_dir()
+    assert not (store.root / CLIP).exists()
+
+
+def test_what_was_damaged_there_is_uploaded_again_by_the_machine_that_holds_it(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    url = f"memory://{tmp_path.name}"
+    there = open_users_store(url)
+    compute(there, ClipArtifact, CLIP)
+    files, base = file_system(url)
+    [payload] = [path for path in files.find(base) if not path.endswith(MANIFEST)]
+    whole = files.cat_file(payload)
+    files.pipe_file(payload, whole[:-1] + b"y")
+    there.find(ClipArtifact, CLIP.partition("/")[2])
+    assert "1 damaged" in said("verify", "--store", url, code=1)
+    assert "1 removed" in said("verify", "--store", url, "--remove", code=1)
+    there.find(ClipArtifact, CLIP.partition("/")[2])
+    assert files.cat_file(payload) == whole
+    assert "Nothing is damaged." in said("verify", "--store", url)
 
 
 def test_verify_names_leftovers_without_failing(store):
