@@ -15,6 +15,8 @@ from pathlib import Path
 from urllib.error import HTTPError, URLError
 from urllib.request import urlopen
 
+import yaml
+
 from flows.production.site import LEASES, LEASES_IN_FILES
 from tests.e2e.production import POOL, ROOT, Production
 from tests.free_port import free_port
@@ -88,11 +90,14 @@ class Services:
 
 
 @contextmanager
-def services(root: Path, database: str | None = None) -> Iterator[Services]:
+def services(
+    root: Path, database: str | None = None, silent_s: int | None = None
+) -> Iterator[Services]:
     """A server with the deployments, and a worker, for as long as the block lasts.
 
     Args:
         database: address of the server's database, by default a file below ``root``.
+        silent_s: so long without a heartbeat, a run is Crashed; by default as long as deployed.
     """
     port = free_port()
     environment = {
@@ -124,11 +129,20 @@ def services(root: Path, database: str | None = None) -> Iterator[Services]:
         patiently = partial(made.prefect, wait_s=400.0)
         patiently("work-pool", "create", POOL, "--type", "process")
         patiently("--no-prompt", "deploy", "-n", "full", "--prefect-file", DEPLOYMENTS)
+        _end_silent_runs(made, silent_s)
         together.worker.start()
         yield together
     finally:
         together.worker.kill()
         together.server.kill()
+
+
+def _end_silent_runs(made: Production, silent_s: int | None) -> None:
+    """The automation that is deployed; it may be quicker than on a site."""
+    content = yaml.safe_load((ROOT / "deployments" / "zombies.yaml").read_text())
+    if silent_s:
+        content["trigger"]["within"] = silent_s
+    made.ask("/automations/", content)
 
 
 def until(true: Callable[[], object], within_s: float, what: str, every_s: float = 0.2) -> None:

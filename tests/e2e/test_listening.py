@@ -9,7 +9,9 @@ import time
 
 import pytest
 
+from flows.production.site import Database
 from tests.e2e.dask_cluster import ROOT, cluster
+from tests.e2e.services import ENDED
 from tests.e2e.sockets import beyond_loopback, listening
 
 pytestmark = pytest.mark.cluster
@@ -59,6 +61,25 @@ def test_a_command_listens_on_loopback_alone(command, scene, environment, tmp_pa
     found = heard_while([command, *words[command], *places], environment)
     assert found  # Prefect's server for as long as the command lasts.
     assert beyond_loopback(found) == set()
+
+
+def test_a_site_and_its_runs_listen_on_loopback_alone(deployed, scene, tmp_path):
+    begun = deployed.start(
+        "mocoflow/full",
+        **{"scene": str(scene), "out": str(tmp_path / "run"), "store": str(tmp_path / "store")},
+        preset="toy",
+        settings=["person_scores.use=off"],
+    )
+    files = list(deployed.site.folder.rglob("*.pid"))
+    found: dict[str, set[str]] = {file.name: set() for file in files}
+    while deployed.state(begun) not in ENDED:
+        for file in files:
+            found[file.name] |= listening(int(file.read_text().split()[0]))
+    assert deployed.state(begun) == "COMPLETED", deployed.logs(begun)
+    assert found["server.pid"]
+    if deployed.site.database == Database.POSTGRESQL:
+        assert found["postmaster.pid"]
+    assert beyond_loopback(set().union(*found.values())) == set()
 
 
 def test_a_dask_cluster_as_the_documentation_starts_it_does_too(environment, tmp_path):
