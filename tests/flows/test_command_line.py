@@ -39,19 +39,27 @@ def one_line_because(errors, reason):
 
 
 @pytest.fixture
-def refuse(monkeypatch, capsys):
-    """Runs it, and expects exit code 2 with one line on stderr that names the reason.
+def command(monkeypatch, capsys):
+    """The same in this process, which has loaded everything already."""
 
-    In this process, which has loaded everything already.
-    """
-
-    def run(*arguments, because):
+    def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["mocoflow", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main()
-        errors = capsys.readouterr().err
-        assert ended.value.code == 2, errors
-        one_line_because(errors, because)
+        said = capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, ended.value.code, said.out, said.err)
+
+    return run
+
+
+@pytest.fixture
+def refuse(command):
+    """Runs it, and expects exit code 2 with one line on stderr that names the reason."""
+
+    def run(*arguments, because):
+        done = command(*arguments)
+        assert done.returncode == 2, done.stderr
+        one_line_because(done.stderr, because)
 
     return run
 
@@ -116,9 +124,9 @@ def test_a_folder_of_other_settings_is_refused(refuse, first_run, toy_scene, sto
     )
 
 
-def test_a_finished_folder_is_found_finished(first_run, toy_scene, store_url):
+def test_a_finished_folder_is_found_finished(command, first_run, toy_scene, store_url):
     out, _ = first_run
-    run = mocoflow(
+    run = command(
         *("reconstruct", toy_scene, "--preset", "toy", "--store", store_url, "--out", out)
     )
     assert run.returncode == 0, run.stderr
@@ -245,28 +253,27 @@ def test_a_damaged_scene_is_bad_input(damage, because, scene, describe, refuse_i
     refuse_inside_the_flow(scene, because)
 
 
-def test_bad_input_found_by_a_stage_ends_with_exit_code_2(scene, describe, tmp_path):
+def test_bad_input_found_by_a_stage_ends_with_exit_code_2(
+    refuse, prefect_server, scene, describe, tmp_path
+):
     with_meshes_in_millimetres(scene, describe)
-    run = mocoflow(
-        *("reconstruct", scene, "--preset", "toy", "--out", tmp_path / "out"),
-        *("--store", tmp_path / "store"),
-    )
-    assert run.returncode == 2, run.stderr
-    one_line_because(run.stderr, "Likely millimetres: multiply the vertices by 0.001")
+    places = ("--out", tmp_path / "out", "--store", tmp_path / "store")
+    reason = "Likely millimetres: multiply the vertices by 0.001"
+    refuse("reconstruct", scene, "--preset", "toy", *places, because=reason)
 
 
-def test_the_same_render_command_gives_the_same_picture(first_run, tmp_path):
+def test_the_same_render_command_gives_the_same_picture(command, first_run, tmp_path):
     out, _ = first_run
     pictures = [tmp_path / f"{number}.png" for number in range(2)]
-    for picture in pictures:
-        command = ("render", out, "--camera", "cam01", "--times", "0.11", "--out", picture)
-        assert mocoflow(*command).returncode == 0
+    for run, picture in zip((mocoflow, command), pictures, strict=True):
+        asked = ("render", out, "--camera", "cam01", "--times", "0.11", "--out", picture)
+        assert run(*asked).returncode == 0
     assert pictures[0].read_bytes() == pictures[1].read_bytes()
 
 
-def test_a_rendered_frame_is_the_scored_view(first_run, tmp_path):
+def test_a_rendered_frame_is_the_scored_view(command, first_run, tmp_path):
     out, _ = first_run
-    done = mocoflow("render", out, "--camera", "cam01", "--frames", "3", "--out", tmp_path / "v")
+    done = command("render", out, "--camera", "cam01", "--frames", "3", "--out", tmp_path / "v")
     assert done.returncode == 0, done.stderr
     rendered = (tmp_path / "v" / "000003.png").read_bytes()
     assert rendered == (out / "views" / "cam01" / "000003.png").read_bytes()
@@ -297,10 +304,10 @@ def test_a_choice_of_times_is_never_ignored_for_another(refuse, first_run, tmp_p
     assert not list(tmp_path.iterdir())
 
 
-def test_fps_beside_frames_is_the_rate_of_the_video(first_run, tmp_path):
+def test_fps_beside_frames_is_the_rate_of_the_video(command, first_run, tmp_path):
     out, _ = first_run
     video = tmp_path / "views.mp4"
-    run = mocoflow("render", out, "--frames", "2,4,5", "--fps", "5", "--out", video)
+    run = command("render", out, "--frames", "2,4,5", "--fps", "5", "--out", video)
     assert run.returncode == 0, run.stderr
     assert describe_video(video) == VideoDescription(fps=5.0, frame_count=3)
 
@@ -314,10 +321,10 @@ def test_a_full_disk_leaves_no_half_of_a_view(refuse, first_run, tmp_path, name)
 
 
 @pytest.mark.parametrize(("out", "wanted"), [("body.glb", "glb"), ("plys", "ply")])
-def test_a_run_is_exported_as_meshes(first_run, tmp_path, out, wanted):
+def test_a_run_is_exported_as_meshes(command, first_run, tmp_path, out, wanted):
     run, _ = first_run
     spacing = ("--spacing-m", "0.04")
-    done = mocoflow(
+    done = command(
         *("export", run, "--format", wanted, "--frames", "2,4-5", *spacing, "--out", tmp_path / out)
     )
     assert done.returncode == 0, done.stderr
@@ -362,15 +369,12 @@ def test_rendering_a_folder_without_a_run_is_refused(refuse, tmp_path):
 
 
 def test_a_plan_prepares_a_scene_for_the_run_that_follows(
-    toy_scene, reconstruct, tmp_path, monkeypatch, capsys
+    command, toy_scene, reconstruct, tmp_path
 ):
     store = tmp_path / "store"
-    words = ["plan", toy_scene, "--preset", "toy", "--store", store]
-    monkeypatch.setattr(sys, "argv", ["mocoflow", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 0
-    printed = capsys.readouterr().out
+    done = command("plan", toy_scene, "--preset", "toy", "--store", store)
+    assert done.returncode == 0
+    printed = done.stdout
     for words in ("What the preparation needs", "What the optimisation needs", "motion residual"):
         assert words in printed
     record = reconstruct(toy_scene, tmp_path / "out", store=str(store))

@@ -83,32 +83,37 @@ def test_a_killed_run_ends_in_the_parameters_of_an_undisturbed_one(
     assert_same(trained, tmp_path)
 
 
+# So high a rate leaves every minimum: the guard goes back at step 50.
+WILD = CAREFUL.model_copy(
+    update={
+        "checkpoint_every_s": 0.1,
+        "coarse_steps": 60,
+        "fine_steps": 40,
+        "rate_features": 0.5,
+        "rate_networks": 0.5,
+        "rate_motion": 0.5,
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def went_back(prepared, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("went_back")
+    return folder, train(prepared, folder, schedule=WILD)
+
+
 @pytest.mark.parametrize("share", [0.4, 0.6])
-def test_a_run_that_went_back_ends_the_same_when_killed_before_or_after(prepared, tmp_path, share):
-    # So high a rate leaves every minimum: the guard goes back at step 50.
-    wild = CAREFUL.model_copy(
-        update={
-            "checkpoint_every_s": 0.1,
-            "coarse_steps": 60,
-            "fine_steps": 40,
-            "rate_features": 0.5,
-            "rate_networks": 0.5,
-            "rate_motion": 0.5,
-        }
-    )
-    undisturbed = train(prepared, tmp_path / "undisturbed", schedule=wild)
+def test_a_run_that_went_back_ends_the_same_when_killed_before_or_after(
+    prepared, went_back, tmp_path, share
+):
+    folder, undisturbed = went_back
     assert any(event["step"] == 50 for event in undisturbed.events)
     with pytest.raises(Killed):
-        train(
-            prepared,
-            tmp_path / "killed",
-            schedule=wild,
-            progress=killed_at(share * SCHEDULE.joint_steps),
-        )
-    resumed = train(prepared, tmp_path / "killed", schedule=wild)
+        train(prepared, tmp_path, schedule=WILD, progress=killed_at(share * SCHEDULE.joint_steps))
+    resumed = train(prepared, tmp_path, schedule=WILD)
     assert resumed.events == undisturbed.events
     assert resumed.losses == pytest.approx(undisturbed.losses)
-    assert_same(tmp_path / "undisturbed", tmp_path / "killed")
+    assert_same(folder, tmp_path)
 
 
 def test_work_after_the_last_checkpoint_is_done_again_to_the_same_end(prepared, trained, tmp_path):
