@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from flows.production.site import Database, Site, default_folder
+from flows.production.deploy_site import deploy_site
+from flows.production.site import MARK, Database, Site, default_folder
 from flows.production.up import bring_up, take_down
 from mocoflow_core.errors import InputError
 
@@ -49,21 +50,27 @@ def deploy(state: State) -> None:
 
     Elsewhere is the server of PREFECT_API_URL, with the variables of the environment.
     """
-    os.environ |= _site_or_server(state.resolve())
-    # Prefect reads its settings when it is imported.
+    if site := _site_meant(state.resolve()):
+        deploy_site(site)
+        return
     from flows.production.deploy import deploy as bring_up_to_date
 
     for line in bring_up_to_date():
         typer.echo(line)
 
 
-def _site_or_server(folder: Path) -> dict[str, str]:
-    """The environment of the site in a folder, unless another server is asked for."""
+def _site_meant(folder: Path) -> Site | None:
+    """The site in a folder, unless another server is asked for, or this is a process of the site.
+
+    Raises InputError where there is neither.
+    """
     site, server = Site.of_folder(folder), os.environ.get("PREFECT_API_URL")
-    if site and server in (None, "", site.api):
-        return site.environment()
+    if os.environ.get(MARK) == str(folder):
+        return None
+    if site and (not server or site.is_at(server)):
+        return site
     if server:
-        return {}
+        return None
     raise InputError(
         "PREFECT_API_URL, or a site that `make up` has made",
         f"neither, and none in {folder}",

@@ -28,16 +28,21 @@ def make_automation(client: SyncPrefectClient, content: dict[str, Any]) -> None:
 def make_notifications(client: SyncPrefectClient, contents: Sequence[dict[str, Any]]) -> str:
     """Let the block that the environment names tell of what they wait for; say who is told.
 
-    Where it names none, or one that the server does not have, there are none afterwards.
+    Where it names none, there are none afterwards; where it names one that the server does not
+    have, they stay as they are.
     """
-    name = os.environ.get(BLOCK, "")
-    block = _block_id(client, name)
-    if block is None:
+    name = os.environ.get(BLOCK)
+    if not name:
         for content in contents:
             for found in _named(client, content["name"]):
                 client.request("DELETE", "/automations/{id}", path_params={"id": found})
-        why = f"{name} is no block of the server: make it on the page Blocks" if name else "set one"
-        return f"nobody is told of failures and regressions ({BLOCK}): {why}, deploy again"
+        return f"nobody is told of failures and regressions: set {BLOCK} and deploy again"
+    block = _block_id(client, name)
+    if block is None:
+        return (
+            f"who is told of failures and regressions stays as it was: {BLOCK} is {name}, and the "
+            "server has no such block: make it on the page Blocks and deploy again"
+        )
     for content in contents:
         actions = [{**action, "block_document_id": block} for action in content["actions"]]
         make_automation(client, {**content, "actions": actions})

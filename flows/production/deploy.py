@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from httpx import HTTPStatusError
+from httpx import HTTPStatusError, TransportError
 from prefect.client.orchestration import SyncPrefectClient, get_client
 from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
 from prefect.exceptions import ObjectNotFound
+from prefect.settings import PREFECT_API_URL
 
 from flows.data_set_roots import ROOTS, configured_roots
 from flows.production.automations import make_automation, make_notifications
@@ -30,7 +31,7 @@ def deploy() -> list[str]:
     The schedule of a data set runs where its root is a folder, and is paused where it is not.
 
     Raises InputError outside of the repository's root, for a store that cannot be made, and where
-    the server wants another password.
+    no server answers, or wants another password.
     """
     pool = _read("pool.yaml")
     make_store()
@@ -51,8 +52,15 @@ def deploy() -> list[str]:
 
 @contextmanager
 def _let_in() -> Iterator[None]:
+    """Raise InputError where no server answers, or where it wants another password."""
     try:
         yield
+    except TransportError as error:
+        raise InputError(
+            f"a server that answers at {PREFECT_API_URL.value()}",
+            f"{type(error).__name__}: {error}",
+            "make up, or correct PREFECT_API_URL.",
+        ) from error
     except HTTPStatusError as error:
         if error.response.status_code != HTTPStatus.UNAUTHORIZED:
             raise

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from pathlib import Path
 
 from flows.allowed_addresses import CLUSTER_ADDRESSES
 from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT, STORE
 from flows.data_set_roots import ROOTS
+from mocoflow_core.errors import InputError
 
 # The notification block through which people are told of bad nights.
 BLOCK = "MOCOFLOW_NOTIFICATION_BLOCK"
@@ -31,19 +33,37 @@ def told(folder: Path) -> dict[str, str]:
 
 
 def kept(folder: Path) -> dict[str, str]:
-    """What ``keep`` has kept in a site's folder."""
+    """What ``keep`` has kept in a site's folder. Raises InputError for a file that is not its."""
+    file = folder / FILE
     try:
-        return json.loads((folder / FILE).read_text())
+        found = json.loads(file.read_text())
     except FileNotFoundError:
         return {}
+    except (OSError, ValueError) as error:
+        raise _unreadable(file, error) from error
+    if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
+        raise _unreadable(file, "no names with texts")
+    return found
 
 
 def keep(folder: Path, settings: dict[str, str]) -> None:
     """For their owner alone: a store's address may have a password in it."""
-    file = folder / FILE
-    file.touch()
-    file.chmod(0o600)
-    file.write_text(json.dumps(settings) + "\n")
+    # A new file, and never what a link of that name leads to.
+    descriptor, beside = tempfile.mkstemp(dir=folder, prefix=f".{FILE}.")
+    try:
+        with os.fdopen(descriptor, "w") as file:
+            file.write(json.dumps(settings) + "\n")
+        Path(beside).replace(folder / FILE)
+    finally:
+        Path(beside).unlink(missing_ok=True)
+
+
+def _unreadable(file: Path, found: object) -> InputError:
+    return InputError(
+        f"{file} must be what the site was told, as mocoflow has written it",
+        str(found),
+        "Remove it, and say everything again with `make up`.",
+    )
 
 
 def _whole(name: str) -> str:

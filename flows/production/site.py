@@ -8,6 +8,7 @@ import sys
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from flows.allowed_folders import DATA_ROOTS, RESULTS_ROOT
 from flows.production.settings import KEPT, told
@@ -58,6 +59,12 @@ class Site:
     def api(self) -> str:
         return f"{self.pages}/api"
 
+    def is_at(self, address: str) -> bool:
+        """Whether an address of an API is this one's, however it is spelt."""
+        asked, ours = urlsplit(address.rstrip("/")), urlsplit(self.api)
+        here = asked.hostname in ("localhost", "127.0.0.1", "::1")
+        return here and (asked.port, asked.path) == (ours.port, ours.path)
+
     @property
     def logs(self) -> Path:
         return self.folder / "logs"
@@ -69,7 +76,8 @@ class Site:
         """Of the site's processes: the user's own, with the site's settings, also of earlier times.
 
         Runs are confined to folders: the user's, or else those that mocoflow has among their data.
-        An empty variable counts as none, and a relative path lies below the working directory.
+        An empty variable takes back what was told, and a relative path lies below the working
+        directory.
         """
         chosen = {
             MARK: str(self.folder),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import sys
 from collections.abc import Iterator
 from http import HTTPStatus
@@ -13,9 +12,9 @@ from typing import Any
 from urllib.error import HTTPError
 
 from flows.production.api import admits, answers, ask, wait_for
+from flows.production.deploy_site import deploy_site, require_the_same_worker
 from flows.production.postgresql import PostgreSQL
 from flows.production.processes import end_what_is_left, is_running, start, stop
-from flows.production.settings import FIXED, KEPT, keep, kept
 from flows.production.site import AUTHENTICATION, PREFECT, Database, Site
 from mocoflow_core.errors import InputError
 
@@ -30,10 +29,10 @@ def bring_up(site: Site) -> Iterator[str]:
     """Start what is not running yet, deploy, and say what was done.
 
     Raises InputError for a port that is taken, and for another database, password or other folders
-    than what is running has.
+    than what is running has; RuntimeError where something does not start.
     """
     _require_the_same(site)
-    _require_the_same_worker(site)
+    require_the_same_worker(site)
     site.folder.mkdir(parents=True, exist_ok=True)
     site.logs.mkdir(exist_ok=True)
     url = PostgreSQL(site).start() if site.database == Database.POSTGRESQL else None
@@ -45,8 +44,7 @@ def bring_up(site: Site) -> Iterator[str]:
     _require(wait_for(lambda: answers(site.api), STARTS_WITHIN_S), site, "server")
     _require_the_same_password(site)
     yield f"server       {site.api}"
-    keep(site.folder, _settings(site))
-    _deploy(site)
+    deploy_site(site)
     _pause(site, False)
     if not is_running(site, "worker"):
         words = ["worker", "start", "--pool", POOL, "--name", _worker()]
@@ -89,16 +87,6 @@ def _start_server(site: Site, url: str | None) -> None:
             )
     words = ["server", "start", "--host", "127.0.0.1", "--port", str(site.port)]
     start(site, "server", [*PREFECT, *words], site.environment(url))
-
-
-def _deploy(site: Site) -> None:
-    """In a process of its own, as Prefect reads its settings when it is imported."""
-    words = [sys.executable, "-m", "flows.production", "deploy", "--state", str(site.folder)]
-    if subprocess.run(words, env=site.environment()).returncode != 0:
-        raise RuntimeError(
-            "what is written above kept the deployments from being made, and no worker was "
-            "started. Mend it, and `make up` again."
-        )
 
 
 def _cancel_runs(site: Site, grace_s: float) -> Iterator[str]:
@@ -164,20 +152,6 @@ def _require_the_same(site: Site) -> None:
         )
 
 
-def _require_the_same_worker(site: Site) -> None:
-    """A schedule that is due would otherwise find a worker without the data set's root."""
-    if not is_running(site, "worker"):
-        return
-    before, now = kept(site.folder), _settings(site)
-    differ = [name for name in FIXED if before.get(name) != now.get(name)]
-    if differ:
-        raise InputError(
-            "the settings that the running worker was started with",
-            f"another {', '.join(differ)}",
-            "Take it down first: make down.",
-        )
-
-
 def _require_the_same_password(site: Site) -> None:
     secret = os.environ.get(AUTHENTICATION)
     is_open = admits(site.api, None)
@@ -187,7 +161,3 @@ def _require_the_same_password(site: Site) -> None:
             "another one" if secret else "none",
             "Set the same, or take it down first: make down.",
         )
-
-
-def _settings(site: Site) -> dict[str, str]:
-    return {name: value for name, value in site.environment().items() if name in KEPT}

@@ -204,17 +204,16 @@ def extract_camera(
     remarks = []
     threshold = configuration.difference_threshold
     masking, plating = part_of(progress, DECODING, MASKING), part_of(progress, MASKING, PLATING)
-    differing = part_of(progress, PLATING, 1.0)
     if mask_files:
         masks = working_masks(mask_files, indices, view, masking)
     else:
         if plate is None:
-            plate, _ = _plate(frames, None, usable, configuration, masking)
+            plate, _ = _plate(frames, None, usable, configuration, part_of(masking, 0.0, 0.5))
             remarks.append(
                 f"{name} has neither masks nor a background picture: the person is what differs "
                 "from the median of its frames, shadows with it"
             )
-        masks = masks_from_plate(frames, plate, threshold, differing)
+        masks = masks_from_plate(frames, plate, threshold, part_of(masking, 0.5, 1.0))
     if plate is None or needs.background:
         plate, guessed = _plate(frames, masks, usable, configuration, plating)
         if guessed and configuration.behind(scene) != "white":
@@ -223,7 +222,7 @@ def extract_camera(
                 "frame: the background there is filled from around"
             )
     if needs.masks:
-        masks = masks_from_plate(frames, plate, threshold, differing)
+        masks = masks_from_plate(frames, plate, threshold, part_of(progress, PLATING, 1.0))
     return Clip(
         camera=view.camera,
         fps=selection.fps,

@@ -315,12 +315,25 @@ def test_a_frame_that_is_shown_twice_is_worked_on_once(folder):
     ],
 )
 def test_how_far_it_is_only_grows_through_all_that_takes_long(folder, needs, phase):
+    only_grows(folder, needs, "mask 0 of cam00", phase)
+
+
+@pytest.mark.parametrize(
+    "needs",
+    [ClipNeeds(), ClipNeeds(background=True), ClipNeeds(background=True, masks=True)],
+)
+def test_so_it_does_where_masks_are_made_of_the_background(folder, needs):
+    edit_description(folder, lambda description: description["cameras"]["cam00"].pop("masks"))
+    only_grows(folder, needs, "masks from the background")
+
+
+def only_grows(folder, needs, *phases):
     told = []
     extract_clip(open_scene(folder), CaptureConfig(), needs, progress=lambda *now: told.append(now))
     shares, words = zip(*told, strict=True)
     assert list(shares) == sorted(shares)
     assert 0 < shares[0] < shares[-1] <= 1
-    assert {"frame 0 of cam00", phase, "frames compared"} <= set(words)
+    assert {"frame 0 of cam00", "frames compared", *phases} <= set(words)
 
 
 def test_checking_a_clip_tells_of_every_frame(folder):

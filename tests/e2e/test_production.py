@@ -18,6 +18,7 @@ from PIL import Image
 
 from flows.production.api import ask
 from flows.production.postgresql import PostgreSQL
+from flows.production.settings import FILE, KEPT
 from flows.production.site import Database, Site
 from tests.e2e.production import ROOT, UNNEEDED, available_database, new, site_command
 
@@ -192,11 +193,12 @@ def test_who_starts_a_run_cannot_change_its_process(variable, deployed):
     assert f"('{variable}' was unexpected)" in " ".join(str(refused.value).split())
 
 
-def test_the_worker_is_remembered_for_its_owner_and_without_passwords(deployed):
-    noted = deployed.site.folder / "worker.json"
+def test_what_it_was_told_is_kept_for_its_owner_and_without_passwords(deployed):
+    noted = deployed.site.folder / FILE
     assert noted.stat().st_mode & 0o077 == 0
     assert "MOCOFLOW_DATA_ROOTS" in noted.read_text()
     assert UNNEEDED not in noted.read_text()
+    assert set(json.loads(noted.read_text())) <= set(KEPT)
 
 
 def test_up_again_changes_nothing_that_runs(deployed):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flows.production.postgresql import find_programs
-from flows.production.settings import BLOCK, FILE, WORKER_VARIABLES, keep, kept
+from flows.production.settings import BLOCK, FILE, KEPT, WORKER_VARIABLES, keep, kept, told
 from flows.production.site import AUTHENTICATION, Database, Site
 from flows.production.up import bring_up
 from mocoflow_core.errors import InputError
@@ -35,14 +35,14 @@ def test_a_site_is_not_given_an_empty_database_in_place_of_its_own(tmp_path):
 
 
 def test_a_site_keeps_what_it_was_told_until_it_is_told_otherwise(tmp_path, monkeypatch):
-    def up(**told):
+    def up(**said):
         with monkeypatch.context() as once:
-            for name in (*WORKER_VARIABLES, BLOCK):
+            for name in KEPT:
                 once.delenv(name, raising=False)
-            for name, value in told.items():
+            for name, value in said.items():
                 once.setenv(name, value)
             found = Site(tmp_path).environment()
-        keep(tmp_path, {name: value for name, value in found.items() if "MOCOFLOW_" in name})
+            keep(tmp_path, told(tmp_path))
         return found.get("MOCOFLOW_AIST_ROOT"), found.get(BLOCK)
 
     assert up() == (None, None)
@@ -55,6 +55,35 @@ def test_a_site_keeps_what_it_was_told_until_it_is_told_otherwise(tmp_path, monk
     assert up(MOCOFLOW_AIST_ROOT="") == (None, "slack-webhook/ops")
     assert kept(tmp_path)[BLOCK] == "slack-webhook/ops"
     assert (tmp_path / FILE).stat().st_mode & 0o077 == 0
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"MOCOFLOW_STORE": 1}'])
+def test_what_was_told_is_never_lost_silently(content, tmp_path):
+    (tmp_path / FILE).write_text(content)
+    with pytest.raises(InputError, match=f"{FILE} must be what the site was told"):
+        Site(tmp_path).environment()
+
+
+def test_what_is_told_is_written_to_no_place_that_a_link_leads_to(tmp_path):
+    elsewhere = tmp_path / "precious"
+    elsewhere.write_text("precious")
+    (tmp_path / FILE).symlink_to(elsewhere)
+    keep(tmp_path, {BLOCK: "slack-webhook/ops"})
+    assert elsewhere.read_text() == "precious"
+    assert kept(tmp_path) == {BLOCK: "slack-webhook/ops"}
+
+
+@pytest.mark.parametrize(
+    ("address", "ours"),
+    [
+        ("http://127.0.0.1:4321/api", True),
+        ("http://localhost:4321/api/", True),
+        ("http://127.0.0.1:4200/api", False),
+        ("http://elsewhere:4321/api", False),
+    ],
+)
+def test_a_site_is_known_by_its_address(address, ours, tmp_path):
+    assert Site(tmp_path, 4321).is_at(address) == ours
 
 
 @pytest.mark.parametrize("empty", ["", ":", "::"])
@@ -137,8 +166,8 @@ def test_a_running_worker_is_not_left_without_a_root_that_is_new(tmp_path, monke
     site = Site(tmp_path, 4321)
     site.save()
     monkeypatch.delenv("MOCOFLOW_AIST_ROOT", raising=False)
-    keep(tmp_path, {n: v for n, v in site.environment().items() if n.startswith("MOCOFLOW_")})
-    monkeypatch.setattr("flows.production.up.is_running", lambda *_: True)
+    keep(tmp_path, told(tmp_path))
+    monkeypatch.setattr("flows.production.deploy_site.is_running", lambda *_: True)
     monkeypatch.setenv("MOCOFLOW_AIST_ROOT", "/sets/aist")
     with pytest.raises(InputError, match=r"another MOCOFLOW_AIST_ROOT\. Take it down"):
         next(bring_up(site))
