@@ -30,15 +30,15 @@ down: install
 test: install
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-# Whole processes: killed ranks and runs, a server with a worker. Some minutes.
+# Whole processes: killed ranks and runs, a server with a worker. Eight minutes.
 e2e: install
 	$(BIN)/python -m pytest -m e2e
 
-# Benchmarks in several processes and on a Dask cluster, who can reach them, who is told. Some minutes.
+# Benchmarks in several processes and on a Dask cluster, who can reach them, who is told.
 cluster: install
 	$(BIN)/python -m pytest -m cluster
 
-# What is lost when something dies or breaks: docs/reliability.md. Some twenty minutes.
+# What is lost when something dies or breaks: docs/reliability.md. Half an hour.
 faults: install
 	$(BIN)/python -m pytest -m faults
 
