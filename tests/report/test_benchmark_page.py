@@ -105,17 +105,22 @@ def test_a_first_night_has_no_history(page):
     assert "worse than in earlier nights" not in page
 
 
+def page_after_nights(results, folder, usual):
+    """The page of a benchmark after three nights with the same numbers."""
+    past = [
+        HistoryRow(f"2026-01-0{night}", "", scene, "fast", method, measure, value)
+        for night in (1, 2, 3)
+        for (scene, method, measure), value in usual.items()
+    ]
+    write_benchmark_page(replace(results, past=past), COMMAND, folder / "benchmark.html")
+    return (folder / "benchmark.html").read_text()
+
+
 def test_what_is_worse_than_in_the_nights_before_stands_above_and_beside_their_chart(
     results, tmp_path
 ):
-    past = [
-        HistoryRow(f"2026-01-0{night}", "", "turn", "fast", method, "psnr_union", value)
-        for night in (1, 2, 3)
-        for method, value in (("mocoflow", 22.0), ("without_local", 20.0))
-    ]
-    path = tmp_path / "benchmark.html"
-    write_benchmark_page(replace(results, past=past), COMMAND, path)
-    page = path.read_text()
+    psnr = {("turn", "mocoflow", "psnr_union"): 22.0, ("turn", "without_local", "psnr_union"): 20.0}
+    page = page_after_nights(results, tmp_path, psnr)
     assert "1 number is worse than in earlier nights" in page
     nights = page[page.index("Over the nights") :]
     assert "turn/fast/mocoflow: PSNR, person" in nights
@@ -125,14 +130,8 @@ def test_what_is_worse_than_in_the_nights_before_stands_above_and_beside_their_c
 
 
 def test_numbers_that_there_are_none_of_any_more_are_told_together(results, tmp_path):
-    past = [
-        HistoryRow(f"2026-01-0{night}", "", "walk", "fast", "mocoflow", measure, value)
-        for night in (1, 2, 3)
-        for measure, value in (("ssim", 0.9), ("oks", 0.8))
-    ]
-    path = tmp_path / "benchmark.html"
-    write_benchmark_page(replace(results, past=past), COMMAND, path)
-    page = path.read_text()
+    gone = {("walk", "mocoflow", "ssim"): 0.9, ("walk", "mocoflow", "oks"): 0.8}
+    page = page_after_nights(results, tmp_path, gone)
     assert "1 number is worse" in page
     assert "no number any more: OKS (usually 0.800), SSIM (usually 0.900)" in page
     assert page.index("see which") < page.index('id="nights"')  # Though there is no chart.
