@@ -30,7 +30,7 @@ down: install
 test: install
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-# Whole processes: killed ranks and runs, a server with a worker. Eight minutes.
+# Whole processes: killed ranks and runs, a server with a worker. Nine minutes.
 e2e: install
 	$(BIN)/python -m pytest -m e2e
 
